@@ -130,8 +130,8 @@ class LazyMethod:
     @cached_property
     def direct(self) -> Any:
         """That of models without instances, whose names have no dots."""
-        found = CALLS[self.name]
-        return both_names(found if callable(found) else find_function(found, self.name))
+        result = CALLS[self.name]
+        return both_names(result if callable(result) else find_function(result, self.name))
 
 
 class Module(BoundModel):

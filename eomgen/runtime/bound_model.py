@@ -71,13 +71,13 @@ class BoundModel:
         self.layout = layout = Layout(core.metadata)
         self._setup(core, layout.without_signals(u), self._declared("parameter", p), self._declared("input", u))
 
-    def _declared(self, what: str, given: Any) -> Any:
+    def _declared(self, what: str, raw: Any) -> Any:
         layout = self.layout
         names, key = (layout.p, "p_values") if what == "parameter" else (layout.u, "u_values")
-        if not isinstance(given, Mapping):
-            return given
+        if not isinstance(raw, Mapping):
+            return raw
         current = np.array([np.nan if value is None else value for value in getattr(layout.info, key)], dtype=float)
-        return layout.values(what, names, given, current)
+        return layout.values(what, names, raw, current)
 
     def _setup(self, core: Core, layout: Layout, p: Any, u: Any) -> None:
         self.kernels = kernels = Kernels(core, layout, p, u)
@@ -258,9 +258,9 @@ class BoundModel:
             The values are not reached from the declared position without leaving its branch; the loops are then closed
             from the nearest guess; or an angle of more than two turns is given, as degrees would be.
         """
-        initial, given = self._given(values, named, t, p, u)
-        q = initial.assembled(given.positions)
-        v = initial.velocities(q, given.rates if given.positions or given.rates else None)
+        initial, raw = self._given(values, named, t, p, u)
+        q = initial.assembled(raw.positions)
+        v = initial.velocities(q, raw.rates if raw.positions or raw.rates else None)
         return np.concatenate([q, v])
 
     _declared_start = cached_property[Array](lambda self: self.x0())  # of the declared initial values at t = 0
@@ -296,10 +296,10 @@ class BoundModel:
         AssemblyError
             The loops do not close.
         """
-        initial, given = self._given(guess, named, t, p, u)
-        if given.rates:
-            raise ill_placed(f"assemble takes positions only, not {', '.join(given.rates)}; use x0 for rates")
-        return initial.from_guess(given.positions) if given.positions else initial.assembled({})
+        initial, raw = self._given(guess, named, t, p, u)
+        if raw.rates:
+            raise ill_placed(f"assemble takes positions only, not {', '.join(raw.rates)}; use x0 for rates")
+        return initial.from_guess(raw.positions) if raw.positions else initial.assembled({})
 
     @both_names
     @np.errstate(all="ignore")
@@ -319,9 +319,9 @@ class BoundModel:
         coordinates keep the values of the first position.  The search is bounded and repeats exactly; it may miss a
         branch.
         """
-        initial, given = self._given(values, named, t, p, u)
-        first = initial.assembled(given.positions, rough=True)
-        return initial.branches(given.positions, first)
+        initial, raw = self._given(values, named, t, p, u)
+        first = initial.assembled(raw.positions, rough=True)
+        return initial.branches(raw.positions, first)
 
     @both_names
     @np.errstate(all="ignore")
@@ -363,8 +363,8 @@ class BoundModel:
     def _initial(self, t: float, p: Any, u: Any, names: Iterable[str] = ()) -> Initial:
         """The assembly of this model with other parameters and inputs, if given, to values of these names."""
         layout = self.layout
-        for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
-            scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
+        for name, raw, what in (("p", p, "parameters"), ("u", u, "inputs")):
+            scalar = isinstance(raw, (float, int, np.number)) or (isinstance(raw, np.ndarray) and not raw.ndim)
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "state" if name in layout.states else "velocity" if name in layout.v else "coordinate"
                 raise ill_placed(f"{name}= gives the {what}; give the {kind} {name!r} in a dict: {{{name!r}: ...}}")

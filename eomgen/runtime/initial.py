@@ -59,10 +59,10 @@ def require_rank(kernels: Kernels, J: Array) -> None:
     changed = [name for name, value, declared in pairs if value != declared]
     if not changed:
         return
-    found = rank(J).rank
-    if found > layout.rank:
+    result = rank(J).rank
+    if result > layout.rank:
         raise UsageError(
-            f"with the given {', '.join(changed)}, {found} constraint rows are independent, but with the declared "
+            f"with the given {', '.join(changed)}, {result} constraint rows are independent, but with the declared "
             f"values {layout.rank} are, and these determine the degrees of freedom; declare values like the given ones",
             code="EG-REDUNDANT",
         )
@@ -113,21 +113,19 @@ def where_lost(system: ClosureSystem, q: Array) -> Array:
     return best
 
 
-def on_branches(
-    kernels: Kernels, t: float, q: Array, J: Array, given: Mapping[str, Sequence[Array]], v: Array
-) -> Array:
+def on_branches(kernels: Kernels, t: float, q: Array, J: Array, raw: Mapping[str, Sequence[Array]], v: Array) -> Array:
     """The velocities (n,) or (n, m) of the only branch that has the given ones, or AssemblyError; see StartBranch."""
     if v.ndim > 1:
-        return np.array([on_branches(kernels, t, q, J, given, column) for column in v.T]).T
-    for part in _parts(kernels, J, given):
-        v = StartBranch(kernels, t, q, J, given, part).complete(v)
+        return np.array([on_branches(kernels, t, q, J, raw, column) for column in v.T]).T
+    for part in _parts(kernels, J, raw):
+        v = StartBranch(kernels, t, q, J, raw, part).complete(v)
     return v
 
 
-def _parts(kernels: Kernels, J: Array, given: Mapping[str, Sequence[Array]]) -> Iterator[tuple[Indices, Indices]]:
+def _parts(kernels: Kernels, J: Array, raw: Mapping[str, Sequence[Array]]) -> Iterator[tuple[Indices, Indices]]:
     """Rows and velocities of loops that are connected, by given velocities too."""
     known = kernels.layout.scales.known
-    held = [row != 0.0 for gradients in given.values() for row in gradients]
+    held = [row != 0.0 for gradients in raw.values() for row in gradients]
     pattern = np.array([*(np.ones(J.shape, dtype=bool) if known is None else known), *held])
     for levels in parts(pattern):
         rows = np.concatenate([level.rows for level in levels])
@@ -149,10 +147,10 @@ class StartBranch:
         t: float,
         q: Array,
         J: Array,
-        given: Mapping[str, Sequence[Array]],
+        raw: Mapping[str, Sequence[Array]],
         part: tuple[Indices, Indices],
     ) -> None:
-        self.kernels, self.t, self.q, self.names = kernels, t, q, list(given)
+        self.kernels, self.t, self.q, self.names = kernels, t, q, list(raw)
         self.layout = kernels.layout
         self.scales = self.layout.scales
         (m, n), (rows, columns) = J.shape, part
@@ -160,7 +158,7 @@ class StartBranch:
         kept = int(np.count_nonzero(sizes > GONE * sizes[0]))
         self.lost, free = np.zeros((m, len(rows) - kept)), np.zeros((n, len(columns) - kept))
         self.lost[rows], free[columns] = U[:, kept:], V[kept:].T
-        held = np.array([row for gradients in given.values() for row in gradients])
+        held = np.array([row for gradients in raw.values() for row in gradients])
         if len(held):
             _, sizes, V = algebra.svd(held @ free)
             free = free @ V[int(np.count_nonzero(sizes > GONE)) :].T
@@ -188,17 +186,17 @@ class StartBranch:
         undecided = self._heard(slopes)
         if not undecided.shape[1] and np.abs(here).max(initial=0.0) <= ONE_BRANCH:
             return v
-        found = self._roots(d, undecided * speed, speed, here)
-        if not found and self.free.size:  # midway between branches slopes vanish
+        result = self._roots(d, undecided * speed, speed, here)
+        if not result and self.free.size:  # midway between branches slopes vanish
             ways = np.random.default_rng(2).normal(size=(2, self.free.shape[1]))
             slopes = np.vstack([slopes, *(self._slopes(d + speed * self.free @ way, speed) for way in ways)])
             undecided = self._heard(slopes)
-            found = self._roots(d, undecided * speed, speed, here)
-        found = [v + w * self.scales.q for w in found]
-        if len(found) != 1:
+            result = self._roots(d, undecided * speed, speed, here)
+        result = [v + w * self.scales.q for w in result]
+        if len(result) != 1:
             faults = slopes[: len(here)] @ (self.free.T @ undecided) if undecided.shape[1] else here
-            raise self._refusal(v, faults, undecided, found)
-        return found[0]
+            raise self._refusal(v, faults, undecided, result)
+        return result[0]
 
     def _slopes(self, d: Array, speed: float) -> Array:
         """How L^T b changes along the free directions, (k, f)."""
@@ -231,7 +229,7 @@ class StartBranch:
             for j in range(i):
                 both = value(unit[i] + unit[j]) - up[i] - up[j] + here
                 H[:, i, j] = H[:, j, i] = 0.5 * both
-        random, found = np.random.default_rng(1), list[Array]()
+        random, result = np.random.default_rng(1), list[Array]()
         for n in range(STARTS):
             y = random.normal(size=k) * (0.0, 1.0, 3.0)[min(n, 1 + n % 2)]
             for _ in range(ROUNDS):
@@ -241,11 +239,11 @@ class StartBranch:
             if not np.abs(here + K @ y + (H @ y) @ y).max() <= ONE_BRANCH * size**2:
                 continue
             way = W @ y
-            if all(np.abs(way - other).max() > COUPLED * speed * size for other in found):
-                found.append(way)
-        return found
+            if all(np.abs(way - other).max() > COUPLED * speed * size for other in result):
+                result.append(way)
+        return result
 
-    def _refusal(self, v: Array, faults: Array, undecided: Array, found: list[Array]) -> AssemblyError:
+    def _refusal(self, v: Array, faults: Array, undecided: Array, result: list[Array]) -> AssemblyError:
         layout = self.layout
         rows = np.abs(self.lost @ faults.reshape(len(faults), -1)).max(axis=1)
         labels = [layout.constraint_labels[i] for i in np.flatnonzero(rows > 0.1 * rows.max())]
@@ -266,9 +264,9 @@ class StartBranch:
             left = left - np.outer(left @ row, row)
             left[size == 0.0] = 0.0
         shown = " or ".join(
-            "(" + ", ".join(f"{n} = {x[layout.v.index(n)]:.6g}" for n in wanted) + ")" for x in found[:4]
-        ) + (" or ..." if len(found) > 4 else "")
-        several = f"branches found have {shown}" if found else "no branch was found that has them"
+            "(" + ", ".join(f"{n} = {x[layout.v.index(n)]:.6g}" for n in wanted) + ")" for x in result[:4]
+        ) + (" or ..." if len(result) > 4 else "")
+        several = f"branches found have {shown}" if result else "no branch was found that has them"
         return AssemblyError(
             f"{where}, where the given velocities do not distinguish its branches: {several}; give "
             f"{' and '.join(wanted)} too, or start a little beside this position",
@@ -307,8 +305,8 @@ def find_wanted(kernels: Kernels, name: str, t: float) -> Wanted | None:
 
     Refuses an output that depends on accelerations, or on velocities otherwise than linearly, and an unknown marker.
     """
-    if found := place_of_marker(name):
-        return _of_marker(kernels, name, *found)
+    if result := place_of_marker(name):
+        return _of_marker(kernels, name, *result)
     plain = kernels.layout.plain(name)  # tip_x of an instance leg is leg.tip_x too
     return _of_output(kernels, plain, t) if plain in kernels.layout.y else None
 
@@ -320,8 +318,8 @@ def _of_output(kernels: Kernels, name: str, t: float) -> Wanted:
     zero = np.zeros(n_v)
     # at one position a slope may vanish that counts elsewhere, as sin(q) does at 0
     tried = [layout.q_reference + turn * np.linspace(0.7, 1.3, n_q) for turn in (0.0, 0.3, -0.2)]
-    found = np.array([[slopes(q, v, zero, t=t)[k] for v in (zero, np.linspace(0.3, 1.1, n_v))] for q in tried])
-    by_q, by_v, by_a = (np.nan_to_num(part) for part in np.split(found, (n_q, n_q + n_v, n_q + 2 * n_v), axis=-1)[:3])
+    result = np.array([[slopes(q, v, zero, t=t)[k] for v in (zero, np.linspace(0.3, 1.1, n_v))] for q in tried])
+    by_q, by_v, by_a = (np.nan_to_num(part) for part in np.split(result, (n_q, n_q + n_v, n_q + 2 * n_v), axis=-1)[:3])
     if by_a.any() or not np.allclose(by_v[:, 0], by_v[:, 1]):
         on = "accelerations" if by_a.any() else "velocities, and not linearly"
         raise cannot(
@@ -387,8 +385,8 @@ class Initial:
         self.coordinates = layout.q + layout.loops
         self.wanted: dict[str, Wanted] = {}
         if names is not None:
-            found = (find_wanted(kernels, name, t) for name in dict.fromkeys([*names, *layout.initial_outputs]))
-            self.wanted = {one.name: one for one in found if one is not None}
+            result = (find_wanted(kernels, name, t) for name in dict.fromkeys([*names, *layout.initial_outputs]))
+            self.wanted = {one.name: one for one in result if one is not None}
         if self.wanted:
             self.layout = copy(layout)
             self.layout.initial = {**layout.initial, **layout.initial_outputs}
@@ -399,8 +397,10 @@ class Initial:
         cut, n = self.system.cut, len(self.place.q)
 
         def evaluate(q: Array, t: float) -> tuple[Array, Array]:
-            (y, y_q), found = cut.evaluate(q, t), [one.evaluate(q, t) for one in wanted]
-            return np.append(y, [value for value, _ in found]), np.vstack([y_q.reshape(-1, n), *(x for _, x in found)])
+            (y, y_q), result = cut.evaluate(q, t), [one.evaluate(q, t) for one in wanted]
+            return np.append(y, [value for value, _ in result]), np.vstack(
+                [y_q.reshape(-1, n), *(x for _, x in result)]
+            )
 
         names, scales = tuple(one.name for one in wanted), np.append(cut.scales, [one.scale for one in wanted])
         joints = CutJoints(cut.names + names, cut.kinds + ("turn",) * len(names), scales, evaluate)
@@ -410,9 +410,9 @@ class Initial:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout, wanted = self.layout, self.wanted
         rates = layout.v + layout.loop_rates
-        given = {name: x for name, x in values.items() if place_of_marker(name)}
-        given |= without_dots({name: x for name, x in values.items() if name not in given}, layout.instances)
-        for name in given:
+        raw = {name: x for name, x in values.items() if place_of_marker(name)}
+        raw |= without_dots({name: x for name, x in values.items() if name not in raw}, layout.instances)
+        for name in raw:
             if name in wanted or name in self.coordinates or name in rates:
                 continue
             if name in layout.p:
@@ -424,8 +424,8 @@ class Initial:
             if name in layout.y:
                 raise UnknownNameError(f"{name!r} is an output, which cannot be given here; give coordinates or rates")
             raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
-        fast = {n: x for n, x in given.items() if (wanted[n].of_velocities if n in wanted else n in rates)}
-        return Given(self.system.settle({n: x for n, x in given.items() if n not in fast}), fast)
+        fast = {n: x for n, x in raw.items() if (wanted[n].of_velocities if n in wanted else n in rates)}
+        return Given(self.system.settle({n: x for n, x in raw.items() if n not in fast}), fast)
 
     # functions of q
 
@@ -440,12 +440,12 @@ class Initial:
             raise AssemblyError("the axes of a joint flipped on the path there", code="EG-UNDETERMINED")
         return q
 
-    def reference(self, given: Iterable[str] = (), rough: bool = True) -> Array:
+    def reference(self, raw: Iterable[str] = (), rough: bool = True) -> Array:
         """The reference position, closed again for these parameters and this time.
 
         Declared values lead there but those to be `given`; unless ``rough``, it warns where they leave its branch.
         """
-        if (moved := self.moved_reference(given, rough)) is not None:
+        if (moved := self.moved_reference(raw, rough)) is not None:
             return moved
         declared = self.sort(self.layout.initial).positions
         try:
@@ -455,33 +455,33 @@ class Initial:
 
     def close_near(self, start: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Array:
         """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
-        found = self.system.close(start, held, restarts)
-        if found.residual > SETTLED:
-            return where_lost(self.system.closure(held), found.q)
-        return found.q
+        result = self.system.close(start, held, restarts)
+        if result.residual > SETTLED:
+            return where_lost(self.system.closure(held), result.q)
+        return result.q
 
     def used(self, declared: dict[str, float]) -> dict[str, float]:
         """Declared values of which a start is made; refuses one that is no number with the parameters bound."""
         if self.layout.rebound is not None:
             p, undefined = self.layout.rebound
             if bad := [undefined[name] for name in declared if name in undefined]:
-                given = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.layout.p, p, strict=True))
-                raise not_finite(f"{bad[0]} is no number with {given}: {TO_BE_FINITE}")
+                raw = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.layout.p, p, strict=True))
+                raise not_finite(f"{bad[0]} is no number with {raw}: {TO_BE_FINITE}")
             warn_of_fixed(self.layout, p, declared)
         return declared
 
-    def moved_reference(self, given: Iterable[str], rough: bool) -> Array | None:
+    def moved_reference(self, raw: Iterable[str], rough: bool) -> Array | None:
         """Where drivers by this time, or bound parameters, bring the reference position; None without, or blocked."""
         if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= SETTLED:
-            return None if self.layout.rebound is None else self._at_parameters(given, rough)
-        first = Initial(self.kernels).reference(given, rough)
+            return None if self.layout.rebound is None else self._at_parameters(raw, rough)
+        first = Initial(self.kernels).reference(raw, rough)
         try:
             return follow(self.system.at(0.0), first, {}, self.t)
         except AssemblyError as error:
             self.tell_branch(f"the position at t = {self.t:.6g} s", error)
             return None
 
-    def _at_parameters(self, given: Iterable[str], rough: bool) -> Array | None:
+    def _at_parameters(self, raw: Iterable[str], rough: bool) -> Array | None:
         """The reference position with the initial values of now, but those to be `given`; None if they are as declared.
 
         The values are followed from those at the declared parameters; where these do not close the loops of now, from
@@ -494,7 +494,7 @@ class Initial:
         now = self.sort(layout.initial).positions
         if before == now:
             return None
-        known = [name for name in given if name in (*system.names, *system.cut.names)]
+        known = [name for name in raw if name in (*system.names, *system.cut.names)]
         wanted = now = {name: value for name, value in now.items() if name not in known}
         blocked = start = None
         ways: tuple[dict[str, float], ...] = (before, {})
@@ -505,12 +505,12 @@ class Initial:
                 return self.follow(start, wanted)
             except AssemblyError as error:
                 blocked = error
-        found = self.close_near(layout.q_reference, wanted)
+        result = self.close_near(layout.q_reference, wanted)
         changed = {name: value for name, value in wanted.items() if value != before.get(name)}
         # where they stand still at the reference, it is on no branch of theirs
         if start is not None and not rough and len(self.compatible(start, (), changed)) == len(changed):
             self.tell_branch(", ".join(f"{name} = {value:.6g}" for name, value in changed.items()), blocked)
-        return found
+        return result
 
     def tell_branch(self, what: str, error: AssemblyError | None) -> None:
         """Warn that a position was found by closing the loops anew."""
@@ -521,40 +521,40 @@ class Initial:
         )
 
     @np.errstate(all="ignore")
-    def assembled(self, given: Mapping[str, float], rough: bool = False) -> Array:
+    def assembled(self, raw: Mapping[str, float], rough: bool = False) -> Array:
         """Position with the given values exact, and the declared ones where they leave room.
 
         Warns where that leaves the branch of the reference position, unless the values are a ``rough`` guess.
         """
         layout = self.layout
-        declared = {name: x for name, x in self.sort(layout.initial).positions.items() if name not in given}
-        if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *given)):
-            return self.system.with_values(layout.q_reference, {**self.used(declared), **given})
-        if not given:
+        declared = {name: x for name, x in self.sort(layout.initial).positions.items() if name not in raw}
+        if not layout.n_h and not any(name in self.system.cut.names for name in (*declared, *raw)):
+            return self.system.with_values(layout.q_reference, {**self.used(declared), **raw})
+        if not raw:
             if (moved := self.moved_reference((), rough)) is None:
                 return self.close_near(layout.q_reference, self.used(declared))
             return self.follow(moved, self.used(self.compatible(moved, {}, declared)))
         try:
-            start = self.reference(given, rough)
+            start = self.reference(raw, rough)
         except AssemblyError:
-            return self.close_near(layout.q_reference, given)  # these parameters close somewhere else, if anywhere
-        soft = self.used(self.compatible(start, given, declared))
+            return self.close_near(layout.q_reference, raw)  # these parameters close somewhere else, if anywhere
+        soft = self.used(self.compatible(start, raw, declared))
         blocked = None
-        for held in ({**given, **soft}, given):
+        for held in ({**raw, **soft}, raw):
             try:
                 return self.follow(start, held)
             except AssemblyError as error:
                 blocked = error
         try:
-            found = self.close_near(start, {**given, **soft}, restarts=4 if soft else RESTARTS)
+            result = self.close_near(start, {**raw, **soft}, restarts=4 if soft else RESTARTS)
         except AssemblyError:
             if not soft:
                 raise
-            found = self.close_near(start, given)
+            result = self.close_near(start, raw)
         # where they stand still at the reference, it is on no branch of theirs
-        if not rough and len(self.compatible(start, (), given)) == len(given):
-            self.tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
-        return found
+        if not rough and len(self.compatible(start, (), raw)) == len(raw):
+            self.tell_branch(place(tuple(raw), np.array(list(raw.values()))).removeprefix(", "), blocked)
+        return result
 
     def from_guess(self, guess: Mapping[str, float]) -> Array:
         """Position near a guess: its values are kept as far as they can be, independent coordinates first."""
@@ -573,29 +573,29 @@ class Initial:
         start = self.system.with_values(layout.q_reference, {**declared, **guess})
         soft = self.compatible(start, {}, {**ordered, **declared})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
-            found = close_nearest(self.system, start, held, guess)
-            if found is not None:
-                return found.q
+            result = close_nearest(self.system, start, held, guess)
+            if result is not None:
+                return result.q
         return self.system.close(start, {}).q
 
-    def branches(self, given: Mapping[str, float], first: Array, tries: int = 60, many: int = 16) -> list[Array]:
+    def branches(self, raw: Mapping[str, float], first: Array, tries: int = 60, many: int = 16) -> list[Array]:
         """Every position found that holds the given values and, if they leave freedom, further ones of `first`.
 
         Each is searched around too, until there are more than `many`.
         """
-        layout, found = self.layout, [first]
+        layout, result = self.layout, [first]
         there = dict(zip(layout.q, first.tolist(), strict=True))
         favoured = [n for i in layout.independent if (n := layout.velocity_labels[i]) in there]
-        rest = {} if given else self.sort(layout.initial).positions
-        more = self.compatible(first, given, rest | {n: there[n] for n in (*favoured, *layout.q)})
-        room = max(layout.n_q - layout.n_h - len(given), 0)  # a singular position seems to have more freedom
-        system = self.system.closure({**given, **dict([*more.items()][:room])})
-        for here in found:  # which grows: the legs of a platform flip one by one
-            for start in starts(here, system.free, self.place, tries if len(found) <= many or here is first else 0):
+        rest = {} if raw else self.sort(layout.initial).positions
+        more = self.compatible(first, raw, rest | {n: there[n] for n in (*favoured, *layout.q)})
+        freedom = max(layout.n_q - layout.n_h - len(raw), 0)  # a singular position seems to have more freedom
+        system = self.system.closure({**raw, **dict([*more.items()][:freedom])})
+        for here in result:  # which grows: the legs of a platform flip one by one
+            for start in starts(here, system.free, self.place, tries if len(result) <= many or here is first else 0):
                 q, residual = close(system, start)
-                if closed(residual) and self.system.aligned(q) and all(self.apart(q, other) for other in found):
-                    found.append(q)
-        return found
+                if closed(residual) and self.system.aligned(q) and all(self.apart(q, other) for other in result):
+                    result.append(q)
+        return result
 
     def apart(self, a: Array, b: Array) -> bool:
         """Whether two positions differ by more than full turns of angles."""
@@ -617,18 +617,18 @@ class Initial:
 
     # velocities
 
-    def velocities(self, q: Array, given: Mapping[str, float | Array] | None) -> Array:
+    def velocities(self, q: Array, raw: Mapping[str, float | Array] | None) -> Array:
         """Velocities with the given rates exact, and the declared ones where they leave room; None: declared exact.
 
         Rates of shape (m,) give m motions at this position, velocities (n, m).
         """
         if self.layout.n_c:
             require_rank(self.kernels, self.scaled_jacobian(q))
-        declared = {name: x for name, x in self.sort(self.layout.initial).rates.items() if name not in (given or {})}
-        if given is not None:
-            self._require_motion(q, given)
-            declared = self.compatible(q, given, declared, positions=False) if declared else {}
-        held: dict[str, float | Array] = {**(given or {}), **self.used(declared)}
+        declared = {name: x for name, x in self.sort(self.layout.initial).rates.items() if name not in (raw or {})}
+        if raw is not None:
+            self._require_motion(q, raw)
+            declared = self.compatible(q, raw, declared, positions=False) if declared else {}
+        held: dict[str, float | Array] = {**(raw or {}), **self.used(declared)}
         return self.on_branch(q, self._solve_rates(q, held), list(held))
 
     def on_branch(self, q: Array, v: Array, names: Sequence[str]) -> Array:
@@ -652,7 +652,7 @@ class Initial:
         """J (n_c, n_v): C_q, scaled."""
         return self.scales.jacobian(self._C_q(q, t=self.t))
 
-    def _require_motion(self, q: Array, given: Mapping[str, float | Array]) -> None:
+    def _require_motion(self, q: Array, raw: Mapping[str, float | Array]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates."""
         layout = self.layout
         if not layout.n_c:
@@ -660,7 +660,7 @@ class Initial:
         J = self.scaled_jacobian(q)
         basis = algebra.svd(J)[2][rank(J).rank :]
         driven = self._solve_rates(q, {}) / self.scales.q  # what driven constraints impose
-        for name, values in given.items():
+        for name, values in raw.items():
             value = max(np.ravel(values).tolist(), key=abs)
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else self.rate_equation(q, name)[2]
             row = self.gradients(q, name)[0]
@@ -706,7 +706,7 @@ class Initial:
     # which values can be held together
 
     def compatible(
-        self, q: Array, given: Iterable[str], rest: Mapping[str, float], positions: bool = True
+        self, q: Array, raw: Iterable[str], rest: Mapping[str, float], positions: bool = True
     ) -> dict[str, float]:
         """Those of `rest`, in order, that are independent of the constraints, of `given` and of each other at q.
 
@@ -714,7 +714,7 @@ class Initial:
         """
         layout, scales = self.layout, self.place if positions else self.scales
         C_q = self.system.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
-        rows = [*scales.jacobian(C_q), *(row for name in given for row in self.gradients(q, name))]
+        rows = [*scales.jacobian(C_q), *(row for name in raw for row in self.gradients(q, name))]
         stacked = np.reshape(rows, (len(rows), len(scales.q)))
         basis = algebra.svd(stacked)[2][: rank(stacked).rank] if rows else stacked
         kept = {}

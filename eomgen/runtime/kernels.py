@@ -122,8 +122,8 @@ class Kernels:
 
     def _unscaled(self, *_: Any) -> None:
         """Refuse parameters whose lengths and masses scale nothing."""
-        given = zip(self.layout.p, self.context.p, strict=True)
-        bad = [f"{name} = {value:.6g}" for name, value in given if not np.isfinite(value)]
+        raw = zip(self.layout.p, self.context.p, strict=True)
+        bad = [f"{name} = {value:.6g}" for name, value in raw if not np.isfinite(value)]
         raise not_finite(f"the sizes computed from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
 
     def kernel(
@@ -148,8 +148,8 @@ class Kernels:
         if name in self.core.names:
             places = None if pick is None or np.array_equal(pick, _places(shape)) else pick.ravel()
             make = self.core.kernel
-            found = make(name, self.context, result, self.fail, *ORDERS[kind], nan, ill_shaped, places, choose)
-            return cast("Call", found)
+            collected = make(name, self.context, result, self.fail, *ORDERS[kind], nan, ill_shaped, places, choose)
+            return cast("Call", collected)
         if 0 in shape:
             n = layout.inputs(name)
             return self.derived(name, kind, lambda *x, **_: np.zeros((*result, *batch_of(x, n))), choose)
@@ -174,8 +174,8 @@ class Kernels:
     def derived(self, name: str, kind: str, find: Callable[..., Array], choose: Any = None) -> Call:
         """A call of a kind that is made of kernels: ``find(*states, p=, u=, t=)`` -> its result."""
 
-        def call(*states: Any, out: Array | None = None, **given: Any) -> Array:
-            return into(out, find(*states, **given))
+        def call(*states: Any, out: Array | None = None, **raw: Any) -> Array:
+            return into(out, find(*states, **raw))
 
         return self._made(name, kind, find=call, choose=choose)
 
@@ -193,12 +193,12 @@ class Kernels:
 
     def rows(self, name: str, chosen: Any, t: float, x: Array, u: Array | None = None) -> Array:
         """Rows of a timed kernel at one state; the others need not be numbers there."""
-        found = np.asarray(self.kernel(name, nan=True)(t, x, u=u)[chosen])
-        if not np.isfinite(found).all():
+        result = np.asarray(self.kernel(name, nan=True)(t, x, u=u)[chosen])
+        if not np.isfinite(result).all():
             self.kernel(name)(t, x, u=u)  # tells what is wrong
-        return found
+        return result
 
-    def _normalised(self, x: Any, **given: Any) -> Array:
+    def _normalised(self, x: Any, **raw: Any) -> Array:
         """The projection of a tree: nothing to do but for the length of Euler parameters."""
         result = np.array(read_numbers("x", x))
         batch_of((result,), self.layout.n_x)
@@ -279,7 +279,7 @@ def _differentiated(kernels: Kernels, wrt: Any) -> Call | None:
     return kernels.derivative("input_jacobian" if wrt == "u" else "parameter_jacobian")
 
 
-def _mechanical_forces(kernels: Kernels, q: Any, v: Any, a: Any, **given: Any) -> Array:
+def _mechanical_forces(kernels: Kernels, q: Any, v: Any, a: Any, **raw: Any) -> Array:
     """The inverse dynamics of a model with first-order states, whose rates may be left out."""
     layout, states, rates = kernels.layout, read_numbers("v", v), read_numbers("a", a)
     if states.shape[:1] != (layout.n_v,):
@@ -290,7 +290,7 @@ def _mechanical_forces(kernels: Kernels, q: Any, v: Any, a: Any, **given: Any) -
         )
     if rates.shape[:1] == (layout.moving,):
         rates = np.concatenate([rates, np.zeros((layout.n_states, *rates.shape[1:]))])
-    return np.array(kernels.inverse_dynamics(q, states, rates, **given)[: layout.moving])
+    return np.array(kernels.inverse_dynamics(q, states, rates, **raw)[: layout.moving])
 
 
 #: Sums over all bodies, in ground axes, which are parts of the kernel ``centroidal``.
@@ -304,15 +304,15 @@ def _centroidal(kernels: Kernels, name: str) -> Call:
     (start, shape), rates = places[PARTS.index(name)], name == "momentum"
     n = layout.n_x if rates else layout.n_q
 
-    def find(x: Any, **given: Any) -> Array:
+    def find(x: Any, **raw: Any) -> Array:
         if layout.sizes.n_com == 0:  # the model has no bodies, or none with a mass
             raise UsageError(f"model {layout.name!r} has no {name}: no body of it has a mass", code="EG-NO-INERTIA")
         state = read_numbers("x", x)
         if state.shape[:1] != (n,) or state.ndim > 2:
             raise ill_shaped(f"{'x' if rates else 'q'} must have shape ({n},) or ({n}, k), not {state.shape}")
         full = np.concatenate([state, np.zeros((layout.n_x - n, *state.shape[1:]))])
-        found = whole(full, **given)[start : start + prod(shape)]
-        return np.array(found.reshape(shape + state.shape[1:]))
+        result = whole(full, **raw)[start : start + prod(shape)]
+        return np.array(result.reshape(shape + state.shape[1:]))
 
     return kernels.derived(name, "state", find)
 
@@ -385,8 +385,8 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: dict[str, float]
 
 def _find_loaded(name: str) -> Any:
     """The core of a name, if it is loaded: the module itself, or the model that is linked with a package's module."""
-    found = find_module(name)
-    return getattr(found, "model", found)
+    result = find_module(name)
+    return getattr(result, "model", result)
 
 
 def _find_core(name: str, file: str) -> Any:

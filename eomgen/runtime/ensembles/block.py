@@ -166,7 +166,7 @@ class RunBlock:
         Number of events.
     notes : (2 + n_x, m, k) array or None
         Number, time and state of the first m events of each run; NaN where there were fewer.
-    words : dict of int to str
+    texts : dict of int to str
         What more there is to say about a run.
     """
 
@@ -181,7 +181,7 @@ class RunBlock:
     evaluations: Integers
     noted: Integers
     notes: Array | None = None
-    words: dict[int, str] = field(default_factory=dict)
+    texts: dict[int, str] = field(default_factory=dict)
 
     @classmethod
     def blank(cls, runs: Runs, count: int, status: int = 0) -> RunBlock:
@@ -198,7 +198,7 @@ class RunBlock:
 def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None = None) -> RunBlock:
     """Run all of a block on threads, whose number changes no result; ``watch`` takes how many runs have ended."""
     varied, plan, count = runs.varied, runs.plan, runs.count
-    x0, failed, words = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
+    x0, failed, texts = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
     core: Any = eager(runs.module.core)
     run = _run_compiled if plan.method in core.methods else _run_python
     good = np.flatnonzero(~failed)
@@ -207,7 +207,7 @@ def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None 
     block = run(runs, x0[:, some].T, p, u, threads, watch)
     if good.size < count:
         block = _spread(block, good, RunBlock.blank(runs, count, UNASSEMBLED))
-        block.words.update(zip(np.flatnonzero(failed).tolist(), words, strict=True))
+        block.texts.update(zip(np.flatnonzero(failed).tolist(), texts, strict=True))
     project(runs, block)
     return block
 
@@ -271,7 +271,7 @@ def _run_python(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: 
             module.layout.require_allowed(own_p)
             bound = module.rebound(own_p, own_u)
         except UsageError as error:
-            status[k], block.words[k] = BAD_PARAMETERS, str(error)
+            status[k], block.texts[k] = BAD_PARAMETERS, str(error)
             continue
         constants = {name: float(bound.u[module.u_names.index(name)]) for name in plan.constants}
         try:
@@ -286,7 +286,7 @@ def _run_python(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: 
         except (UsageError, MissingDependencyError):
             raise
         except EomgenError as error:
-            status[k], block.words[k] = FAILED, str(error)
+            status[k], block.texts[k] = FAILED, str(error)
             continue
         block.x[:, k], block.t[k], block.evaluations[k] = run.x[:, -1], run.t[-1], run.nfev
         block.steps[k] = len(run.t) - 1
@@ -302,17 +302,17 @@ def _run_python(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: 
 def _take_notes(notes: Array, t_events: list[Array], x_events: list[Array]) -> None:
     """Put the events of a run in order into rows (2 + n, m)."""
     numbers = np.concatenate([np.full(len(t), float(i)) for i, t in enumerate(t_events)])
-    found = np.vstack([numbers, np.concatenate(t_events), np.concatenate(x_events, axis=1)])
-    order = np.argsort(found[1], kind="stable")[: notes.shape[1]]
-    notes[:, : len(order)] = found[:, order]
+    result = np.vstack([numbers, np.concatenate(t_events), np.concatenate(x_events, axis=1)])
+    order = np.argsort(result[1], kind="stable")[: notes.shape[1]]
+    notes[:, : len(order)] = result[:, order]
 
 
-def _spread(found: RunBlock, good: Integers, block: RunBlock) -> RunBlock:
+def _spread(result: RunBlock, good: Integers, block: RunBlock) -> RunBlock:
     """The block with the runs that could be begun in their places."""
-    for name, value in vars(found).items():
+    for name, value in vars(result).items():
         if isinstance(value, np.ndarray):
             getattr(block, name)[..., good] = value
-    block.words.update({int(good[k]): text for k, text in found.words.items()})
+    block.texts.update({int(good[k]): text for k, text in result.texts.items()})
     return block
 
 
@@ -333,17 +333,17 @@ def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -
     led = runs.forcing.constrained
 
     def bring(columns: list[int]) -> None:
-        part, at, given = states[:, :, columns], times[:, columns], runs.varied.column(columns[0])
+        part, at, raw = states[:, :, columns], times[:, columns], runs.varied.column(columns[0])
         good = np.asarray(np.isfinite(part).all(axis=0))
         if not good.any():
             return
         if led:
-            given["u"] = runs.forcing_of(columns[0]).sample(at[good], part[:, good])
-        part[:, good] = runs.module.project(part[:, good], t=at[good], **given)
+            raw["u"] = runs.forcing_of(columns[0]).sample(at[good], part[:, good])
+        part[:, good] = runs.module.project(part[:, good], t=at[good], **raw)
         states[:, :, columns] = part
 
     for k, reason in runs.varied.in_groups(runs.module.layout, [*range(runs.count)], led, bring).items():
-        block.status[k], block.words[k], states[:, :, k] = FAILED, reason, np.nan
+        block.status[k], block.texts[k], states[:, :, k] = FAILED, reason, np.nan
 
 
 # -- reductions --------------------------------------------------------------------------------------------------------
@@ -497,8 +497,8 @@ class Store:
         self._identity = json.dumps({"format": FORMAT, **identity})
         wanted = json.loads(self._identity)
         if manifest.is_file():
-            found = _read_manifest(self.folder)
-            if differing := sorted(name for name in {*wanted, *found} if wanted.get(name) != found.get(name)):
+            result = _read_manifest(self.folder)
+            if differing := sorted(name for name in {*wanted, *result} if wanted.get(name) != result.get(name)):
                 raise bad_data(
                     f"store {self.folder} belongs to another ensemble: {', '.join(differing)} differ; "
                     "name another folder or remove this one"
@@ -517,10 +517,10 @@ class Store:
         """What the seal of a block covers besides its numbers: one of another place or ensemble is none of these."""
         return f"{index} {self._identity}"
 
-    def save(self, index: int, arrays: dict[str, Any], words: dict[int, str]) -> None:
+    def save(self, index: int, arrays: dict[str, Any], texts: dict[int, str]) -> None:
         """Keep the arrays of a block; complete or not there."""
         buffer = io.BytesIO()
-        messages = np.array(json.dumps({str(k): text for k, text in words.items()}))
+        messages = np.array(json.dumps({str(k): text for k, text in texts.items()}))
         np.savez(buffer, **sealed({**arrays, "words": messages}, self._key(index)))
         write_whole(self._path(index), buffer.getvalue())
 
@@ -529,8 +529,8 @@ class Store:
         remove_parts(self._path(index))
         try:
             arrays = read_arrays(self._path(index), compressed=False, key=self._key(index))
-            words = json.loads(str(arrays.pop("words")))
-            return arrays, {int(k): str(text) for k, text in words.items()}
+            texts = json.loads(str(arrays.pop("words")))
+            return arrays, {int(k): str(text) for k, text in texts.items()}
         except FileNotFoundError:
             return None
         except BROKEN as error:
@@ -542,16 +542,16 @@ def _read_manifest(folder: Path) -> dict[str, Any]:
     """Which ensemble a folder holds; nothing where it holds none, or what cannot be read."""
     try:
         with open_plain(folder / "manifest.json") as file:
-            found = json.load(file)
+            result = json.load(file)
     except (OSError, ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return result if isinstance(result, dict) else {}
 
 
 def stored_length(folder: str | Path) -> int | None:
     """Runs of a block of the ensemble that a folder holds; None if it holds none."""
-    found = _read_manifest(as_path("store", folder)).get("block")
-    return found if type(found) is int and 0 < found <= LARGEST else None
+    result = _read_manifest(as_path("store", folder)).get("block")
+    return result if type(result) is int and 0 < result <= LARGEST else None
 
 
 # -- blocks ------------------------------------------------------------------------------------------------------------
@@ -568,7 +568,7 @@ Kept = tuple[Arrays, dict[int, str]]
 def keep(runs: Runs, reduction: Reduction, block: RunBlock) -> Kept:
     """What a reduction makes of a block, and the numbers of each run under ``runs_``."""
     numbers = {f"runs_{name}": getattr(block, name).copy() for name in RUNS}  # a user's function may change the block
-    return {**reduction.reduce(runs, block), **numbers}, block.words
+    return {**reduction.reduce(runs, block), **numbers}, block.texts
 
 
 def choose_size(count: int, bytes_of_a_run: int, workers: int = 1) -> int:

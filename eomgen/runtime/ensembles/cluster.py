@@ -197,5 +197,5 @@ def _task(handle: Handle, varied: Variations, plan: Plan, reduction: Reduction) 
 def _lost(runs: Runs, reduction: Reduction, error: BaseException) -> Kept:
     """What is kept of a block that no worker could run: runs without states, marked so."""
     block = RunBlock.blank(runs, runs.count, LOST)
-    block.words.update(dict.fromkeys(range(runs.count), f"{MEANING[LOST]}: {type(error).__name__}: {error}"))
+    block.texts.update(dict.fromkeys(range(runs.count), f"{MEANING[LOST]}: {type(error).__name__}: {error}"))
     return keep(runs, Reduction(()) if isinstance(reduction, Custom) else reduction, block)  # it has nothing to work on

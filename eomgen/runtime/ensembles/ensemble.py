@@ -35,7 +35,11 @@ ROWS = 12  #: columns whose numbers it lists
 FAILURES = 5  #: runs that it names
 STATISTICS = ("count", "mean", "variance", "least", "greatest")
 #: Of each run, and what it is.
-TOLD = {"status": "0 where the end was reached", "t_end": "how far the run came (s)", "steps": "steps that were taken"}
+COLUMNS_DOC = {
+    "status": "0 where the end was reached",
+    "t_end": "how far the run came (s)",
+    "steps": "steps that were taken",
+}
 
 
 class Failure(NamedTuple):
@@ -82,9 +86,9 @@ class Ensemble(Result):
     """
 
     def __init__(
-        self, runs: Runs, numbers: dict[str, Any], kept: dict[str, Any], words: dict[int, str], reduction: Reduction
+        self, runs: Runs, numbers: dict[str, Any], kept: dict[str, Any], messages: dict[int, str], reduction: Reduction
     ) -> None:
-        self._runs, self._words = runs, words
+        self._runs, self._messages = runs, messages
         self._module, self._variations, self._plan = runs.module, runs.varied, runs.plan
         self.count, self.names, plan = runs.count, runs.names, runs.plan
         self.grid: dict[str, Array] = {}
@@ -95,8 +99,8 @@ class Ensemble(Result):
         self._failure, self._failure_time = numbers["failure"], numbers["failure_time"]
         self._statistics = isinstance(reduction, Statistics)
         self.reduced = kept if isinstance(reduction, Statistics | Custom) else {}
-        found = {} if self.reduced else kept
-        self.reached, self.samples, self._notes = found.get("x"), found.get("samples"), found.get("notes")
+        result = {} if self.reduced else kept
+        self.reached, self.samples, self._notes = result.get("x"), result.get("samples"), result.get("notes")
         self.x = None if self.reached is None else np.where(self.ok, self.reached, np.nan)
 
     @property
@@ -110,8 +114,8 @@ class Ensemble(Result):
 
     def _describe(self, k: int) -> Failure:
         status, code = int(self.status[k]), int(self._failure[k])
-        message = self._words.get(k) or MEANING.get(status, f"status {status}")
-        if code and k not in self._words:
+        message = self._messages.get(k) or MEANING.get(status, f"status {status}")
+        if code and k not in self._messages:
             from ..failure import WORDS
 
             reason = WORDS.get(code, (f"status {code}",))[0]
@@ -132,13 +136,13 @@ class Ensemble(Result):
             raise cannot(f"{self._kept_only}, not {name!r}; run it with reduce='states'")
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
-            found = states[row]
+            result = states[row]
         elif self.samples is None:
-            found = self._runs.with_outputs(self.x, self.t_end)[None, row]
+            result = self._runs.with_outputs(self.x, self.t_end)[None, row]
         else:
             times = np.repeat(self.t[:, None], self.count, axis=1)
-            found = np.stack([self._runs.with_outputs(states[:, j], t)[row] for j, t in enumerate(times)])
-        return np.asarray(found[0] if self.samples is None else found)
+            result = np.stack([self._runs.with_outputs(states[:, j], t)[row] for j, t in enumerate(times)])
+        return np.asarray(result[0] if self.samples is None else result)
 
     @property
     def _kept_only(self) -> str:
@@ -154,8 +158,8 @@ class Ensemble(Result):
         mine = self._notes[0] == self.event_names.index(name)
         most = int(mine.sum(axis=0).max(initial=0))
         order = np.argsort(~mine, axis=0, kind="stable")[:most]
-        found = np.take_along_axis(np.where(mine, self._notes[1:], np.nan), order[None], axis=1)
-        return found[0], found[1:]
+        result = np.take_along_axis(np.where(mine, self._notes[1:], np.nan), order[None], axis=1)
+        return result[0], result[1:]
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Mean, deviation, least and greatest of every state and output at the end, over the runs that got there."""
@@ -246,8 +250,8 @@ class Ensemble(Result):
         variables, coordinates = self._statistics_to_xarray() if self._statistics else self._runs_to_xarray()
         coordinates["t"] = ("t", self.t, {"units": "s", "long_name": "time"})
         metadata = self.metadata
-        words = {"model": metadata["name"], "metadata": json.dumps(metadata)}
-        made: xarray.Dataset = xr.Dataset(variables, coordinates, words)
+        messages = {"model": metadata["name"], "metadata": json.dumps(metadata)}
+        made: xarray.Dataset = xr.Dataset(variables, coordinates, messages)
         return made
 
     def _attributes(self, name: str) -> dict[str, str]:
@@ -277,8 +281,8 @@ class Ensemble(Result):
             labels[name]: (labels[name], values, self._attributes(name)) for name, values in self.grid.items()
         } or {run: (run, np.arange(self.count), {"long_name": "number of the run"})}
         for name, row in varied.items():
-            words = self._attributes(name.removeprefix("initial_"))
-            coordinates.setdefault(name, (dimensions, row.reshape(shape), words))
+            messages = self._attributes(name.removeprefix("initial_"))
+            coordinates.setdefault(name, (dimensions, row.reshape(shape), messages))
         variables: dict[str, Any] = {}
         for name in self.names:
             values = np.asarray(self[name])
@@ -286,7 +290,7 @@ class Ensemble(Result):
                 variables[name] = (dimensions, values.reshape(shape), self._attributes(name))
             else:
                 variables[name] = ((*dimensions, "t"), values.T.reshape(*shape, len(self.t)), self._attributes(name))
-        for name, what in TOLD.items():
+        for name, what in COLUMNS_DOC.items():
             variable = free(name, {*variables, *coordinates})
             variables[variable] = (dimensions, getattr(self, name).reshape(shape), {"long_name": what})
         return variables, coordinates
@@ -294,12 +298,12 @@ class Ensemble(Result):
     def varied(self) -> dict[str, Array]:
         """The parameters, inputs and initial values (k,) that differ between the runs."""
         varied, module = self._variations, self._module
-        found: dict[str, Array] = {}
+        result: dict[str, Array] = {}
         for names, rows in ((module.p_names, varied.p), (module.u_names, varied.u)):
-            found |= dict(zip(names, rows, strict=True)) if rows.ndim > 1 else {}
+            result |= dict(zip(names, rows, strict=True)) if rows.ndim > 1 else {}
         starts = varied.values if varied.states is None else dict(zip(module.x_names, varied.states, strict=True))
-        found |= {f"initial_{name}": np.asarray(row) for name, row in starts.items() if np.ndim(row)}
-        return {name: row for name, row in found.items() if row.size and np.ptp(row)}
+        result |= {f"initial_{name}": np.asarray(row) for name, row in starts.items() if np.ndim(row)}
+        return {name: row for name, row in result.items() if row.size and np.ptp(row)}
 
     @property
     def metadata(self) -> dict[str, Any]:

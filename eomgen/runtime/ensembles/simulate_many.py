@@ -173,8 +173,8 @@ def simulate_many(
         store_of = None if store is None else _open_store(store, runs, reduce, parts)
         kept: dict[int, Kept] = {}
         if store_of is not None:
-            found = {index: store_of.load(index) for index in range(len(parts))}
-            kept = {index: value for index, value in found.items() if value is not None}
+            result = {index: store_of.load(index) for index in range(len(parts))}
+            kept = {index: value for index, value in result.items() if value is not None}
         missing = [index for index in range(len(parts)) if index not in kept]
         look = None if watch is None else watch.look
         for index, value in _run(runs, reduction, parts, missing, threads, client, look):
@@ -214,8 +214,10 @@ def _gather(runs: Runs, reduction: Reduction, parts: list[tuple[int, int]], kept
     ordered = [kept[index] for index in range(len(parts))]
     numbers = {name: np.concatenate([arrays[f"runs_{name}"] for arrays, _ in ordered]) for name in RUNS}
     made = [{name: x for name, x in arrays.items() if not name.startswith("runs_")} for arrays, _ in ordered]
-    words = {start + k: text for (start, _), (_, told) in zip(parts, ordered, strict=True) for k, text in told.items()}
-    return Ensemble(runs, numbers, reduction.join(made), words, reduction)
+    messages = {
+        start + k: text for (start, _), (_, texts) in zip(parts, ordered, strict=True) for k, text in texts.items()
+    }
+    return Ensemble(runs, numbers, reduction.join(made), messages, reduction)
 
 
 def _plan(

@@ -82,8 +82,8 @@ def _assemble_all(
         k = columns[0]
         if led:  # constraints depend on inputs that vary
             values = {name: float(value[k] if np.ndim(value) else value) for name, value in varied.values.items()}
-            given: Any = (values or None) if varied.states is None else varied.states[:, k]
-            x[:, k] = find_state(module.rebound(**varied.column(k)), given, t, forcing_of(k))
+            raw: Any = (values or None) if varied.states is None else varied.states[:, k]
+            x[:, k] = find_state(module.rebound(**varied.column(k)), raw, t, forcing_of(k))
         elif varied.states is not None:
             x[:, columns] = module.project(varied.states[:, columns], t=t, **varied.column(k))
         else:
@@ -97,9 +97,9 @@ def _assemble_all(
     if varied.states is None and not led and (free or differ):
         most = max(ROOM // (layout.n_c * layout.n_v + 1), 1)
         parts = [varied.part(i, i + most) for i in range(0, varied.count, most)]
-        found = [_assemble_side_by_side(module, part, t) for part in parts]
-        good = np.concatenate([good[:0], *(one for _, one in found)])
-        x[:, good] = np.hstack([x[:, :0], *(one for one, _ in found)])[:, good]
+        result = [_assemble_side_by_side(module, part, t) for part in parts]
+        good = np.concatenate([good[:0], *(one for _, one in result)])
+        x[:, good] = np.hstack([x[:, :0], *(one for one, _ in result)])[:, good]
     return x, varied.in_groups(layout, np.flatnonzero(~good).tolist(), led, assemble)
 
 
@@ -107,16 +107,16 @@ def _assemble_named(module: BoundModel, varied: Variations, columns: list[int], 
     """The states of runs that differ, as far as starts can tell, in their named values alone."""
     kernels = Kernels(module.core, module.layout, **varied.column(columns[0]))
     initial = Initial(kernels, t, varied.values)
-    given = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in varied.values.items()})
+    raw = [initial.sort({name: float(x[k] if np.ndim(x) else x) for name, x in varied.values.items()})
              for k in columns]  # fmt: skip
     alike: dict[tuple[float, ...], list[int]] = {}
-    for i, one in enumerate(given):
+    for i, one in enumerate(raw):
         alike.setdefault(tuple(one.positions.values()), []).append(i)
     x = np.empty((module.n_x, len(columns)))
     for places in alike.values():
-        first = given[places[0]]
+        first = raw[places[0]]
         q = initial.assembled(first.positions)
-        rates = {name: np.array([given[i].rates[name] for i in places]) for name in first.rates}
+        rates = {name: np.array([raw[i].rates[name] for i in places]) for name in first.rates}
         v = initial.velocities(q, rates if first.positions or rates else None)
         x[: module.n_q, places] = q[:, None]
         x[module.n_q :, places] = v if v.ndim > 1 else v[:, None]
@@ -163,10 +163,10 @@ class SideBySide:
 
     def jacobian(self, runs: Indices) -> tuple[Array, dict[str, Array]]:
         """Scaled Jacobians (k, n_c, n_v) at the positions of some runs, zero where one is no number; their p, u."""
-        given, n, sizes = self.varied.column(runs), self.layout.n_v, self.sizes[:, runs]
-        J = np.ascontiguousarray((self.C_q(self.q[:, runs], **given) * sizes[:n] / sizes[n:, None]).transpose(2, 0, 1))
+        raw, n, sizes = self.varied.column(runs), self.layout.n_v, self.sizes[:, runs]
+        J = np.ascontiguousarray((self.C_q(self.q[:, runs], **raw) * sizes[:n] / sizes[n:, None]).transpose(2, 0, 1))
         J[~np.isfinite(J).all(axis=(1, 2))] = 0.0
-        return J, given
+        return J, raw
 
     def close(self, held: Sequence[int], runs: Indices) -> None:
         """Close the loops of some runs with some coordinates held."""
@@ -177,8 +177,8 @@ class SideBySide:
         for _ in range(ROUNDS):
             if not len(runs):
                 break
-            J, given = self.jacobian(runs)
-            e = (self.C(self.q[:, runs], **given) / self.sizes[n : n + h, runs]).T
+            J, raw = self.jacobian(runs)
+            e = (self.C(self.q[:, runs], **raw) / self.sizes[n : n + h, runs]).T
             size = np.abs(e).max(axis=1, initial=0.0)
             U, steep, V = np.linalg.svd(J[:, :h, free], full_matrices=False)
             decided = (steep[:, -1:] > SAFE * steep[:, :1]).all(axis=1) & (len(free) <= h)
@@ -205,24 +205,24 @@ class SideBySide:
             self.q[np.array(held)[:, None], runs] = np.where(part == 1.0, values[:, runs], there)
             self.close(held, runs)
 
-    def independent(self, rows: int, given: Sequence[int], rest: Sequence[int]) -> list[int]:
+    def independent(self, rows: int, raw: Sequence[int], rest: Sequence[int]) -> list[int]:
         """Those given, and of the rest, in order, what is independent of the constraints and of each other.
 
         Runs where that is not as at the reference position, or where one that is given can hardly move, are left.
         """
         runs, scales = np.flatnonzero(self.good), self.layout.scales
         if not rows:
-            return [*given, *rest]
+            return [*raw, *rest]
         reference = scales.jacobian(self.C_q(self.layout.q_reference))
-        J, kept = np.concatenate([reference[None], self.jacobian(runs)[0]])[:, :rows], list(given)
+        J, kept = np.concatenate([reference[None], self.jacobian(runs)[0]])[:, :rows], list(raw)
         _, steep, V = np.linalg.svd(J)
         ranks = (steep > STRUCTURE * steep[:, :1]).sum(axis=1)
         alike, N = ranks == ranks[0], V[:, ranks[0] :]  # motions that the constraints allow
-        for i in (*given, *rest):
+        for i in (*raw, *rest):
             size = np.linalg.norm(N[:, :, i], axis=1)
             moves = size > INDEPENDENT
-            alike &= size > STILL if i in given else moves == moves[0]
-            kept += [i] * bool(i not in given and moves[0])
+            alike &= size > STILL if i in raw else moves == moves[0]
+            kept += [i] * bool(i not in raw and moves[0])
             row = np.where(moves, 1.0 / size, 0.0)[:, None] * N[:, :, i]
             N = N - row[:, :, None] * _times(N.transpose(0, 2, 1), row)[:, None]
         self.good[runs[~alike[1:]]] = False
@@ -234,11 +234,11 @@ class SideBySide:
         if not (layout.n_c and len(runs)):
             return v
         n, rank = layout.n_v, layout.rank
-        J, given = self.jacobian(runs)
+        J, raw = self.jacobian(runs)
         steep = np.linalg.svd(J, compute_uv=False)
         regular = ((steep > STRUCTURE * steep[:, :1]).sum(axis=1) == rank) & (steep[:, rank - 1] > GONE * steep[:, 0])
         x, free = (v[:, runs] / self.sizes[:n, runs]).T, np.setdiff1d(np.arange(n), held)
-        rest = (self.C_t(np.concatenate([self.q[:, runs], 0.0 * x.T]), **given) / self.sizes[n:, runs]).T
+        rest = (self.C_t(np.concatenate([self.q[:, runs], 0.0 * x.T]), **raw) / self.sizes[n:, runs]).T
         inverse = np.asarray(np.linalg.pinv(J[:, :, free], rcond=GIVEN), dtype=float)
         for _ in range(2):
             x[:, free] -= _times(inverse, _times(J, x) + rest)
@@ -262,10 +262,10 @@ def _assemble_side_by_side(module: BoundModel, varied: Variations, t: float) -> 
         return numbers, np.zeros(varied.count, dtype=bool)
     for name, value in values.items():
         numbers[entries.index(name)] = value
-    declared, late, given = (
+    declared, late, raw = (
         [entries.index(name) for name in names] for names in (layout.info.initial, now, varied.values)
     )
-    first, moved, asked = ([i for i in places if i < n_q] for places in (declared, late, given))
+    first, moved, asked = ([i for i in places if i < n_q] for places in (declared, late, raw))
     if (t and layout.n_c) or (layout.n_h and moved and asked):
         return numbers, np.zeros(varied.count, dtype=bool)
     starts.good &= np.isfinite(numbers).all(axis=0)
@@ -280,7 +280,7 @@ def _assemble_side_by_side(module: BoundModel, varied: Variations, t: float) -> 
         elif asked:
             held = starts.independent(layout.n_h, asked, [i for i in first if i not in asked])
             starts.lead(held, numbers[held])
-    rates, asked = ([i - n_q for i in places if i >= n_q] for places in (declared, given))
-    if given:
+    rates, asked = ([i - n_q for i in places if i >= n_q] for places in (declared, raw))
+    if raw:
         rates = starts.independent(layout.n_c, asked, [i for i in rates if i not in asked])
     return np.concatenate([starts.q, starts.velocities(rates, numbers[n_q:])]), starts.good

@@ -45,16 +45,16 @@ def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
     layout = module.layout
     states = (*layout.x, *layout.loops, *layout.loop_rates, *layout.y)
     check_names("parameter, input, coordinate or rate", grid, (*module.p_names, *module.u_names, *states))
-    for what, given in zip(("initial", "parameters", "inputs"), groups, strict=True):
-        if given is not None and not isinstance(given, Mapping):
+    for what, raw in zip(("initial", "parameters", "inputs"), groups, strict=True):
+        if raw is not None and not isinstance(raw, Mapping):
             raise incomplete(f"{what} must be given by name beside a grid")
-        if twice := sorted({*grid} & {*without_dots(given or {}, layout.instances)}):
+        if twice := sorted({*grid} & {*without_dots(raw or {}, layout.instances)}):
             raise at_odds(f"grid: {', '.join(twice)} is given in {what} too; give it once")
     axes = grid_axes(grid)
     count = math.prod(map(len, axes.values()))
     require_size(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")
     columns = [column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")]
-    initial, parameters, inputs = (dict(given or {}) for given in groups)
+    initial, parameters, inputs = (dict(raw or {}) for raw in groups)
     for name, column in zip(grid, columns, strict=True):
         home = parameters if name in module.p_names else inputs if name in module.u_names else initial
         home[name] = column
@@ -139,17 +139,17 @@ class Variations:
 
     def column(self, k: int | Indices) -> dict[str, Any]:
         """Parameters and inputs of one run, as ``Module.bind`` takes them, or of some as calls of kernels do."""
-        given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
-        return {name: a if a.ndim == 1 else a[:, k] for name, a in given}
+        raw = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
+        return {name: a if a.ndim == 1 else a[:, k] for name, a in raw}
 
     def digest(self) -> str:
         """SHA-256 of all of it."""
-        found = hashlib.sha256(str(self.count).encode())
+        result = hashlib.sha256(str(self.count).encode())
         for array in (self.p, self.u, self.states):
-            found.update(b"none" if array is None else repr(array.shape).encode() + np.ascontiguousarray(array).data)
+            result.update(b"none" if array is None else repr(array.shape).encode() + np.ascontiguousarray(array).data)
         for name, value in sorted(self.values.items()):
-            found.update(name.encode() + np.ascontiguousarray(value, dtype=float).data)
-        return found.hexdigest()
+            result.update(name.encode() + np.ascontiguousarray(value, dtype=float).data)
+        return result.hexdigest()
 
 
 def collect_variations(
@@ -192,24 +192,24 @@ def collect_variations(
     return replace(varied, starts_differ=bool(differ or (rows != rows[:, :1]).any()))
 
 
-def _bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
+def _bound(what: str, module: BoundModel, raw: Any, lengths: dict[str, int]) -> Array:
     """Values (n,) or (n, k) of parameters or inputs; those not given keep the bound ones."""
-    if given is None:
+    if raw is None:
         return module.p if what == "parameter" else module.u
-    found = _read_bound(what, module, given, lengths)
+    result = _read_bound(what, module, raw, lengths)
     if what == "parameter":
-        module.layout.require_allowed(found)
-    return found
+        module.layout.require_allowed(result)
+    return result
 
 
-def _read_bound(what: str, module: BoundModel, given: Any, lengths: dict[str, int]) -> Array:
+def _read_bound(what: str, module: BoundModel, raw: Any, lengths: dict[str, int]) -> Array:
     layout = module.layout
     names, base = (layout.p, module.p) if what == "parameter" else (layout.u, module.u)
-    if not isinstance(given, Mapping):
-        return _columns(f"{what}s", given, names, lengths)
-    given = without_dots(given, layout.instances)
-    check_names(what, given, names)
-    values = {name: _numbers(f"{what} {name}", x, lengths) for name, x in given.items()}
+    if not isinstance(raw, Mapping):
+        return _columns(f"{what}s", raw, names, lengths)
+    raw = without_dots(raw, layout.instances)
+    check_names(what, raw, names)
+    values = {name: _numbers(f"{what} {name}", x, lengths) for name, x in raw.items()}
     _require_one_length(lengths)
     k = next((len(x) for x in values.values() if np.ndim(x)), None)
     result = base.copy() if k is None else np.repeat(base[:, None], k, axis=1)
@@ -220,22 +220,22 @@ def _read_bound(what: str, module: BoundModel, given: Any, lengths: dict[str, in
 
 def _require_one_length(lengths: Mapping[str, int]) -> None:
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{what}: {k}" for what, k in lengths.items())
-        raise ill_shaped(f"every (k,) and (n, k) array must have the same number of runs k, not {told}")
+        counts = ", ".join(f"{what}: {k}" for what, k in lengths.items())
+        raise ill_shaped(f"every (k,) and (n, k) array must have the same number of runs k, not {counts}")
 
 
-def _columns(what: str, given: Any, names: tuple[str, ...], lengths: dict[str, int]) -> Array:
-    array = _floats(what, given)
+def _columns(what: str, raw: Any, names: tuple[str, ...], lengths: dict[str, int]) -> Array:
+    array = _floats(what, raw)
     if array.ndim not in (1, 2) or array.shape[0] != len(names):
-        told = ", ".join(names) or "none"
-        raise ill_shaped(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{told}], not {array.shape}")
+        counts = ", ".join(names) or "none"
+        raise ill_shaped(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{counts}], not {array.shape}")
     if array.ndim == 2:
         lengths[what] = array.shape[1]
     return array
 
 
-def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
-    array = _floats(what, given)
+def _numbers(what: str, raw: Any, lengths: dict[str, int]) -> Any:
+    array = _floats(what, raw)
     if array.ndim > 1:
         raise ill_shaped(f"{what} must be a number or have shape (k,), not {array.shape}")
     if array.ndim:
@@ -243,8 +243,8 @@ def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
     return array if array.ndim else float(array)
 
 
-def _floats(what: str, given: Any) -> Array:
-    array = np.array(read_numbers(what, given))
+def _floats(what: str, raw: Any) -> Array:
+    array = np.array(read_numbers(what, raw))
     if not np.isfinite(array).all():
         first = np.argwhere(~np.isfinite(array))[0].tolist()
         raise no_number(f"{what} must be finite; entry {first} is {array[tuple(first)]}")
