@@ -21,6 +21,11 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 #: Nothing that executes or parses code by other means than eomgen's own parser is called.
 FORBIDDEN = {"eval", "exec", "sympify", "parse_expr", "lambdify"}
+#: Words that only their authors understand; a name says what a textbook of mechanics or of compilers says.
+PRIVATE = {
+    *("alone", "asked", "bench", "brim", "carried", "clothes", "culprit", "found", "journey", "knob", "leap"),
+    *("passing", "regular", "spot", "told", "travel", "twin", "usual"),
+}
 #: Numbers below this are limits, which stand in files of that name alone; those in formulas, such as 1/720, are larger.
 SMALL = 5e-4
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
@@ -67,6 +72,13 @@ def forbidden() -> Iterator[str]:
         words = {getattr(node, part, None) for node in nodes for part in ("id", "attr", "name", "arg")}
         words |= {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
         yield from (f"{name}: {word} is forbidden" for word in sorted(words & FORBIDDEN))
+
+
+def private_words() -> Iterator[str]:
+    """Names that are private words."""
+    for name, nodes in NODES.items():
+        names = {getattr(node, part, None) for node in nodes for part in ("id", "name", "arg")}
+        yield from (f"{name}: {word} is a private word; use one of a textbook" for word in sorted(names & PRIVATE))
 
 
 def limits() -> Iterator[str]:
@@ -251,7 +263,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
     wrong = [
         line
-        for check in (forbidden, limits, directions, references, packages, keywords, codes, public_tests)
+        for check in (forbidden, private_words, limits, directions, references, packages, keywords, codes, public_tests)
         for line in check()
     ]
     print("\n".join(wrong) or "source text: nothing wrong")

@@ -103,9 +103,9 @@ def consistent(
 
 
 def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held: Sequence[str]) -> None:
-    given = () if weights is None or isinstance(weights, str) else read_names("weights", weights)
+    raw = () if weights is None or isinstance(weights, str) else read_names("weights", weights)
     allowed = tuple(dict.fromkeys((*layout.velocity_labels, *layout.v)))
-    for what, names in (("weights", given), ("hold", held)):
+    for what, names in (("weights", raw), ("hold", held)):
         for name in names:
             if name not in allowed:
                 near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")

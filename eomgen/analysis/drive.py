@@ -243,16 +243,16 @@ def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: A
     layout = states.module.layout
     count = free.shape[1]
     if a is None or isinstance(a, Mapping):
-        given: Mapping[str, Any] = {} if a is None else a
+        raw: Mapping[str, Any] = {} if a is None else a
         rows = {layout.velocity_labels[i]: int(i) for i in layout.independent}
         keys = rows | {layout.a[i]: i for i in rows.values()}
-        for name in given:
+        for name in raw:
             if name not in keys:
                 raise ill_placed(
                     f"a: {name!r} is not an independent coordinate or its acceleration; there are {', '.join(keys)}"
                 )
         values = np.zeros((layout.n_v, count))
-        for name, value in given.items():
+        for name, value in raw.items():
             row = read_numbers(f"a: {name}", value)
             if row.shape not in ((), (count,)):
                 raise ill_shaped(f"a: {name} must be a number or have shape ({count},), one a state, not {row.shape}")

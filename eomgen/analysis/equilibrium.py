@@ -226,20 +226,20 @@ def equilibrium(
     unknowns = read_names("unknowns", unknowns)
     by_name = isinstance(hold, Mapping)
     wanted: dict[str, float | None] = dict(hold) if by_name else dict.fromkeys(read_names("hold", hold))  # type: ignore[arg-type]
-    given = {name: read_number(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
+    raw = {name: read_number(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
     states = _states(module, guess)
     refuse_closed(module.layout, states, "equilibrium")
     initial = Initial(module.kernels, time)
-    if initial.sort(given).rates:
-        raise ill_placed(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(given).rates)}")
-    q = _start(module, guess, given, time)
+    if initial.sort(raw).rates:
+        raise ill_placed(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(raw).rates)}")
+    q = _start(module, guess, raw, time)
     here = read_coordinates(module, q, time)
     for name in wanted:
         if name not in here:
             raise unknown("coordinate", name, here)
-        given.setdefault(name, here[name])
-    given = initial.sort(given).positions
-    search = Search(module, time, given, unknowns, states)
+        raw.setdefault(name, here[name])
+    raw = initial.sort(raw).positions
+    search = Search(module, time, raw, unknowns, states)
     rows = len(search.gradients(module, q))
     if unknowns and len(unknowns) < rows:
         raise ill_shaped(
@@ -288,14 +288,14 @@ def reached(search: Search, point: SearchPoint, start: Array, named: Sequence[st
 def _states(module: BoundModel, guess: Any) -> Array:
     """First-order states where the search begins: of the guess, else declared, else 0."""
     layout = module.layout
-    given = {} if guess is None else guess if isinstance(guess, Mapping) else None
-    if given is None:
+    raw = {} if guess is None else guess if isinstance(guess, Mapping) else None
+    if raw is None:
         whole = np.array(read_numbers("guess", guess))
         if whole.shape == (layout.n_x,):
             return whole[layout.n_x - len(layout.states) :]
-        given = {}
-    declared = {name: x for name, x in layout.initial.items() if name in layout.states and name not in given}
-    values = {**Initial(module.kernels).used(declared), **given}
+        raw = {}
+    declared = {name: x for name, x in layout.initial.items() if name in layout.states and name not in raw}
+    values = {**Initial(module.kernels).used(declared), **raw}
     return np.array([read_number(name, values.get(name, 0.0)) for name in layout.states])
 
 

@@ -43,15 +43,15 @@ class Experiment:
 def read_experiments(module: BoundModel, data: Any, initial: Any, inputs: Any) -> list[Experiment]:
     """All experiments of a call of ``fit``."""
     several = isinstance(data, list | tuple)
-    given = list(data) if several else [data]
-    if not given:
+    raw = list(data) if several else [data]
+    if not raw:
         raise incomplete("data is an empty list; give at least one experiment")
     problems: list[str] = []
     starts, driven = (
-        _one_each(what, x, len(given), several, problems) for what, x in (("initial", initial), ("inputs", inputs))
+        _one_each(what, x, len(raw), several, problems) for what, x in (("initial", initial), ("inputs", inputs))
     )
     result = []
-    for k, one in enumerate(given):
+    for k, one in enumerate(raw):
         where = f"data[{k}]" if several else "data"
         read = _read(module, where, one, problems)
         if read is not None:
@@ -61,20 +61,20 @@ def read_experiments(module: BoundModel, data: Any, initial: Any, inputs: Any) -
     return result
 
 
-def _one_each(what: str, given: Any, count: int, several: bool, problems: list[str]) -> list[Any]:
+def _one_each(what: str, raw: Any, count: int, several: bool, problems: list[str]) -> list[Any]:
     """One value for each experiment: a list of as many, or one for all."""
     listed = (
         several
-        and isinstance(given, list | tuple)
-        and not np.isscalar(given)
-        and (not given or not isinstance(given[0], int | float))
+        and isinstance(raw, list | tuple)
+        and not np.isscalar(raw)
+        and (not raw or not isinstance(raw[0], int | float))
     )
     if not listed:
-        return [given] * count
-    if len(given) != count:
-        problems.append(f"{what} is a list of {len(given)}, and there are {count} experiments; give one for each")
+        return [raw] * count
+    if len(raw) != count:
+        problems.append(f"{what} is a list of {len(raw)}, and there are {count} experiments; give one for each")
         return [None] * count
-    return list(given)
+    return list(raw)
 
 
 def _read(module: BoundModel, where: str, data: Any, problems: list[str]) -> tuple[Array, dict[str, Array]] | None:
@@ -109,26 +109,26 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
         return {TIME: np.asarray(data.t), **{name: np.asarray(data[name]) for name in data.x_names}}
     units: dict[str, Any] = {}
     if hasattr(data, "to_dataframe"):  # an xarray Dataset
-        given = {str(name): data[name].values for name in (*data.coords, *data.data_vars)}
-        units = {str(name): data[name].attrs.get("units") for name in given}
+        raw = {str(name): data[name].values for name in (*data.coords, *data.data_vars)}
+        units = {str(name): data[name].attrs.get("units") for name in raw}
     elif hasattr(data, "columns") and hasattr(data, "index"):  # a pandas DataFrame
-        given = {str(name): data[name] for name in data.columns}
-        given = given if TIME in given else {TIME: data.index, **given}
+        raw = {str(name): data[name] for name in data.columns}
+        raw = raw if TIME in raw else {TIME: data.index, **raw}
         units_of_data = data.attrs.get("units")
         units = dict(units_of_data) if isinstance(units_of_data, Mapping) else {}
     elif isinstance(data, Mapping):
-        given = {str(name): values for name, values in data.items()}
+        raw = {str(name): values for name, values in data.items()}
     else:
         problems.append(f"{where} must be a trajectory, a table or a mapping of names to values, not {shown(data)}")
         return None
-    heads = {name: split_head(name) for name in given}
+    heads = {name: split_head(name) for name in raw}
     units = {heads[name][0]: unit or units.get(name) for name, (_, unit) in heads.items()}
-    given = {heads[name][0]: values for name, values in given.items()}
-    states = [name for name in module.x_names if name in given]
+    raw = {heads[name][0]: values for name, values in raw.items()}
+    states = [name for name in module.x_names if name in raw]
     if states and getattr(data, "attrs", {}).get("model") == module.name:  # the table of a run: as of the run itself
-        given = {name: values for name, values in given.items() if name in (TIME, *states)}
+        raw = {name: values for name, values in raw.items() if name in (TIME, *states)}
     result = {}
-    for name, values in given.items():
+    for name, values in raw.items():
         try:
             result[name] = _numbers(values) * _unit_factor(units.get(name), module.layout.unit(name))
         except (TypeError, ValueError) as error:
@@ -149,28 +149,28 @@ def _numbers(values: Any) -> Array:
         raise ValueError("is not a list of numbers") from None
 
 
-def _unit_factor(given: Any, own: str) -> float:
+def _unit_factor(raw: Any, own: str) -> float:
     """What values in the unit that a table tells are multiplied by; 1 where it tells none."""
-    if not given or given == own:
+    if not raw or raw == own:
         return 1.0
     try:
         from ..model.units import UnitError, read_unit
     except ModuleNotFoundError:
-        raise ValueError(f"is in {given!r}; only eomgen itself converts units, so give it in {own!r}") from None
+        raise ValueError(f"is in {raw!r}; only eomgen itself converts units, so give it in {own!r}") from None
     try:
-        unit, wanted = read_unit(str(given)), read_unit(own)
+        unit, wanted = read_unit(str(raw)), read_unit(own)
     except UnitError as error:
-        raise ValueError(f"is in {given!r}: {error}; {error.remedy}") from None
+        raise ValueError(f"is in {raw!r}: {error}; {error.remedy}") from None
     if own and unit.dimension != wanted.dimension:
-        raise ValueError(f"is in {given!r}, which cannot be turned into {own!r}")
+        raise ValueError(f"is in {raw!r}, which cannot be turned into {own!r}")
     return unit.size / wanted.size
 
 
-def read_sigma(given: Any, names: Sequence[str]) -> dict[str, float] | None:
+def read_sigma(raw: Any, names: Sequence[str]) -> dict[str, float] | None:
     """Standard deviations of the columns, one for each; None where the fit is to find them."""
-    if given is None:
+    if raw is None:
         return None
-    table = dict(given) if isinstance(given, Mapping) else dict.fromkeys(names, given)
+    table = dict(raw) if isinstance(raw, Mapping) else dict.fromkeys(names, raw)
     for name in table:
         if name not in names:
             raise unknown("measured column", name, names)

@@ -335,7 +335,7 @@ class _Problem:
         p = np.where([name in self.names for name in module.p_names], np.nan, module.p)  # whatever they will be
         by_name = [one.initial or () for one in self.experiments if isinstance(one.initial, Mapping | None)]
         declared = [name for name in (*layout.initial, *layout.initial_outputs) if name not in self.initial_names]
-        warn_of_fixed(layout, p, [name for name in declared if any(name not in given for given in by_name)])
+        warn_of_fixed(layout, p, [name for name in declared if any(name not in raw for raw in by_name)])
 
     def _bound(self, name: str) -> float:
         """The value that holds now."""
@@ -344,10 +344,10 @@ class _Problem:
             return float(module.p[module.p_names.index(name)])
         if name in module.u_names:
             return float(module.u[module.u_names.index(name)])
-        given = self.experiments[0].initial or {}
-        if name in given:
-            return read_number(name, given[name])
-        x = module.x0(given, t=float(self.experiments[0].t[0]))
+        raw = self.experiments[0].initial or {}
+        if name in raw:
+            return read_number(name, raw[name])
+        x = module.x0(raw, t=float(self.experiments[0].t[0]))
         if name in module.x_names:
             return float(x[module.x_names.index(name)])
         raise incomplete(f"give a value to start from for {name}: parameters={{{name!r}: ...}}")
@@ -427,14 +427,14 @@ class _Problem:
         return max(float(np.sqrt(squares / free)), MEASURED * self.spread(name))
 
 
-def _bounds(problem: _Problem, given: Mapping[str, Any] | None) -> tuple[Array, Array]:
+def _bounds(problem: _Problem, raw: Mapping[str, Any] | None) -> tuple[Array, Array]:
     low, high = np.full(len(problem.names), -np.inf), np.full(len(problem.names), np.inf)
     for name, pair in bounds_of(problem.module.info).items():  # outside of which there is no run
         if name in problem.names:
             low[problem.names.index(name)], high[problem.names.index(name)] = pair
-    if given is not None:
-        require_mapping("bounds", given)
-    for name, pair in (given or {}).items():
+    if raw is not None:
+        require_mapping("bounds", raw)
+    for name, pair in (raw or {}).items():
         if name not in problem.names:
             raise unknown("fitted parameter", name, problem.names)
         k = problem.names.index(name)

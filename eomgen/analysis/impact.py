@@ -104,21 +104,21 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
     result: dict[str, tuple[float, tuple[str, ...]]] = {}
     placed = [name for name in (*layout.velocity_labels, *layout.loops) if name in layout.q + layout.loops]
     allowed = [*placed, *layout.y]
-    for gap, given in without_dots(friction, layout.instances).items():
+    for gap, raw in without_dots(friction, layout.instances).items():
         if gap not in gaps:
             raise no_such(f"{word}: {gap!r} is no gap of this call; {joined(hint(gap, gaps), _listed(gaps))}")
-        if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
+        if isinstance(raw, str) or not isinstance(raw, Sequence) or len(raw) != 2:
             raise ill_typed(
                 f"{word}: of gap {gap} give the coefficient and the output that is its sliding velocity, "
-                f"(0.3, 'slide'), not {given!r}"
+                f"(0.3, 'slide'), not {raw!r}"
             )
-        mu = read_number(f"{word}: the coefficient of {gap}", given[0])
+        mu = read_number(f"{word}: the coefficient of {gap}", raw[0])
         if not mu >= 0.0:
-            raise off_range(f"{word}: the coefficient of {gap} must be 0 or greater, not {given[0]}")
-        names = (given[1],) if isinstance(given[1], str) else tuple(given[1])
+            raise off_range(f"{word}: the coefficient of {gap} must be 0 or greater, not {raw[0]}")
+        names = (raw[1],) if isinstance(raw[1], str) else tuple(raw[1])
         if not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
             raise ill_typed(
-                f"{word}: of gap {gap} give one sliding velocity, or two at right angles in space, not {given[1]!r}"
+                f"{word}: of gap {gap} give one sliding velocity, or two at right angles in space, not {raw[1]!r}"
             )
         names = tuple(layout.plain(name) for name in names)
         for name in names:

@@ -205,9 +205,9 @@ def _motion(
     arrays = [x[:, None] if single else x for x in arrays]
     shapes = {x.shape[1:] for x in arrays}
     if [x.shape[:1] for x in arrays] != [(n,) for n in sizes] or len(shapes) != 1 or arrays[0].ndim != 2:
-        given = ", ".join(str(np.shape(x)) for x in (q, v, a))
+        raw = ", ".join(str(np.shape(x)) for x in (q, v, a))
         wanted = ", ".join(f"({n},)" for n in sizes)
-        raise ill_shaped(f"q, v, a must have shapes {wanted}, or (..., k) for k states, not {given}")
+        raise ill_shaped(f"q, v, a must have shapes {wanted}, or (..., k) for k states, not {raw}")
     return names, (arrays[0], arrays[1], arrays[2]), single
 
 

@@ -494,10 +494,10 @@ class Saltation(Events):
     """
 
     def __init__(
-        self, run: Variational, given: Any, span: tuple[float, float], tolerances: tuple[float, Any],
+        self, run: Variational, raw: Any, span: tuple[float, float], tolerances: tuple[float, Any],
         corners: Sequence[float],
     ) -> None:  # fmt: skip
-        super().__init__(run.module.layout, given)
+        super().__init__(run.module.layout, raw)
         if self.functions:
             raise cannot(
                 f"event {self.functions[0].name} is a Python function, and its derivatives are not known; give its "

@@ -217,19 +217,19 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     return Differentiated(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
 
 
-def names_to_hold(module: BoundModel, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
+def names_to_hold(module: BoundModel, t: float, x: Array, raw: Mapping[str, float] | None) -> list[str]:
     """Coordinates and rates that an assembly at x holds: given ones, declared ones and independent ones, while they
     leave each other room."""
     layout = module.layout
     initial = Initial(module.kernels, t)
     q, result = x[: layout.n_q], []
-    starts = [*(given or ()), *layout.initial_outputs]
+    starts = [*(raw or ()), *layout.initial_outputs]
     if outputs := [name for name in starts if (name in layout.y and name not in layout.x) or place_of_marker(name)]:
         raise incomplete(
             f"derivatives need a start with held coordinates and rates, not {', '.join(outputs)}; give the "
             "coordinates that x0(...) finds for it"
         )
-    declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
+    declared, chosen = initial.sort(layout.initial), initial.sort(dict(raw or {}))
     free = [layout.velocity_labels[i] for i in layout.independent] + list(layout.q)
     rates = [layout.v[i] for i in layout.independent] + list(layout.v)
     for first, second, rest, positions in (
@@ -492,8 +492,8 @@ def sensitivities(
     forcing.enter(*nodes[:2])
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
-    given = {n: read_number(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
-    held = names_to_hold(here, start, x0, given) if hold is None else _checked(bound, hold)
+    supplied = {n: read_number(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
+    held = names_to_hold(here, start, x0, supplied) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
     chosen = longest_step(bound, method) | {name: value for name, value in options.items() if value is not None}
@@ -505,8 +505,8 @@ def sensitivities(
         with inner_run():
             single = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **settings)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
-    follows = start_slopes(layout, bound.kernels.context.p) if initial is None or given is not None else {}
-    follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (given or ())}
+    follows = start_slopes(layout, bound.kernels.context.p) if initial is None or supplied is not None else {}
+    follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (supplied or ())}
     S0 = start_sensitivity(here, start, x0, held, columns, run.input_slopes(start, x0), follows)
     width = layout.n_x * (1 + len(columns.names))
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)

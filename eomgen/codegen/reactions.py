@@ -339,7 +339,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
             by_multipliers = [column[: len(kinematics.v)] for column in columns[len(laws) :]]
             after = AfterEvents(kinematics, rows, by_multipliers).velocities()
         still, gain = solve_rows(result, rows, len(laws))
-        gain = _asked_at_states(kinematics, gain) if laws else gain
+        gain = _quantities_at_states(kinematics, gain) if laws else gain
         symbols += [row.multiplier for row in rows]
         values, known = solve_laws(list(laws), symbols, still, gain)
     else:  # outputs of a tree: they may speak of accelerations
@@ -353,7 +353,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     return replace(solved, rows_to_hold=known_rows, held_errors=tuple(e for row in rows for e in row.errors))
 
 
-def _asked_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:
+def _quantities_at_states(kinematics: Kinematics, gain: Matrix) -> Matrix:
     """A gain of parameters alone as one of the state, so that it fails with a state, as others do, not before."""
     if not kinematics.names or not symbols_of([k for row in gain for k in row]) <= {*kinematics.parameter_names}:
         return gain

@@ -85,9 +85,9 @@ class Author:
         """
         return str(self.equations.notation.letter(with_instance(letter, name), f"{letter}^{{{literal(name)}}}"))
 
-    def letter(self, usual: str) -> str:
+    def letter(self, standard: str) -> str:
         r"""LaTeX of a letter of ``LETTERS``, or what takes its place where a name of the model is printed so."""
-        return str(self.equations.notation.letter(usual, LETTERS[usual]))
+        return str(self.equations.notation.letter(standard, LETTERS[standard]))
 
     def symbol(self, name: str) -> str:
         """LaTeX of a name of the model."""

@@ -159,7 +159,7 @@ def lowered(orders: Orders, i: int) -> Orders:
     return (*orders[:i], orders[i] - 1, *orders[i + 1 :])
 
 
-class Twin:
+class PythonFallback:
     """The Python side of a function written in C: its value, under ``(0, ...)``, and the derivatives that are known.
 
     These are called with floats, one point at a time, or with whole arrays if they are NumPy ufuncs.  Other derivatives
@@ -238,7 +238,9 @@ class Function:
 
     name: str
     arity: int
-    evaluator: Curve | Surface | Twin | None  #: its values in NumPy; None for native code without a Python twin
+    evaluator: (
+        Curve | Surface | PythonFallback | None
+    )  #: its values in NumPy; None for native code without a Python twin
     native: NativeCode | None = None  #: its C source, if it is no table
     place: tuple[str, int] = ("", 0)  #: file and line where a model file declares it, for messages
     lists = item = False  # as :class:`~eomgen.contact.pairs.PairCall` says of itself
@@ -260,7 +262,7 @@ class Function:
         """The value or a derivative as a function of floats or arrays."""
         return lambda *arguments: self.require_evaluator()(*arguments, *orders)
 
-    def require_evaluator(self) -> Curve | Surface | Twin:
+    def require_evaluator(self) -> Curve | Surface | PythonFallback:
         """The evaluator in NumPy; ModelError of native code without a Python twin."""
         if self.evaluator is None:
             message = "is a C function without a Python version, and must be evaluated in NumPy here"

@@ -19,7 +19,7 @@ from ..base.limits.numbers import APART, PERIODIC
 from ..base.splines import curve_coefficients, slopes
 from ..elements import kinds
 from ..errors import UsageError
-from ..expr.functions import Curve, Function, NativeCode, Orders, Surface, Twin, up_to
+from ..expr.functions import Curve, Function, NativeCode, Orders, PythonFallback, Surface, up_to
 from ..expr.records import dataclass
 from .checks import check_keys
 from .description import DescribedEntry, items
@@ -189,7 +189,9 @@ def _read(reader: Reader, path: str, raw: Any, folder: str) -> tuple[str, str] |
     return None
 
 
-def _fallback(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]) -> Twin | None:
+def _fallback(
+    reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]
+) -> PythonFallback | None:
     """The Python twin."""
     raw, path = entry.values.get("python"), f"{entry.path}.python"
     if raw is None:
@@ -203,7 +205,7 @@ def _fallback(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence
         if not all(callable(f) for f in functions.values()):
             reader.fault(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
             return None
-        return Twin(functions)
+        return PythonFallback(functions)
     source = _read(reader, path, raw, entry.folder)
     if source is None:
         return None
@@ -221,7 +223,7 @@ def _fallback(reader: Reader, entry: DescribedEntry, arity: int, names: Sequence
         remedy = "its functions must have the names of the C functions"
         reader.fault(path, f"{source[0]} has no function {', '.join(missing)}", remedy, "EG-NAME-UNKNOWN")
         return None
-    return Twin({orders: getattr(module, name) for orders, name in names})
+    return PythonFallback({orders: getattr(module, name) for orders, name in names})
 
 
 POINTS = 20_000  #: of a table, those of a grid together
@@ -239,7 +241,7 @@ def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
         function = None if reader.faults.under(entry.path) else _build(reader, entry)
         if function is None:
             arity = _arity_meant(entry)
-            function = Function(str(entry.name), arity, Twin({(0,) * arity: lambda *arguments: 1.0}))
+            function = Function(str(entry.name), arity, PythonFallback({(0,) * arity: lambda *arguments: 1.0}))
         if reader.names.kinds.get(str(entry.name)) == "function":  # not taken by something else
             reader.graph.declare(function)
 

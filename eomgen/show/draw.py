@@ -45,20 +45,18 @@ def position(module: Any, x: Any, t: float) -> Array:
         result: Array = module.x0(x, t=t)[: module.n_q]
         return result
     try:
-        given = np.asarray(x, dtype=float)
+        raw = np.asarray(x, dtype=float)
     except (TypeError, ValueError):
         raise ill_typed(f"x must be a state, a position or values by name, not {shown(x)}") from None
-    if given.shape == () and "x" in module.q_names:
+    if raw.shape == () and "x" in module.q_names:
+        raise ill_shaped(f'x is a whole state here; give the coordinate called x in a mapping: draw({{"x": {raw:g}}})')
+    if raw.shape not in ((module.n_x,), (module.n_q,)):
         raise ill_shaped(
-            f'x is a whole state here; give the coordinate called x in a mapping: draw({{"x": {given:g}}})'
+            f"x has shape {raw.shape}; give a state ({module.n_x},), a position ({module.n_q},) or values by name"
         )
-    if given.shape not in ((module.n_x,), (module.n_q,)):
-        raise ill_shaped(
-            f"x has shape {given.shape}; give a state ({module.n_x},), a position ({module.n_q},) or values by name"
-        )
-    if not np.isfinite(given).all():
+    if not np.isfinite(raw).all():
         raise no_number("x has values that are not finite")
-    return given[: module.n_q]
+    return raw[: module.n_q]
 
 
 def draw(

@@ -273,8 +273,8 @@ def _read_obj(data: bytes) -> Mesh:
         if word == b"v":
             vertices.append([float(x) for x in rest[:3]])
         elif word == b"f":
-            given = [int(one.partition(b"/")[0]) for one in rest]
-            corners = [k - 1 if k > 0 else len(vertices) + k for k in given]
+            raw = [int(one.partition(b"/")[0]) for one in rest]
+            corners = [k - 1 if k > 0 else len(vertices) + k for k in raw]
             faces += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
     return np.array(vertices).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
 

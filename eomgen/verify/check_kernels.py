@@ -377,9 +377,9 @@ def _by(model: CheckedModel, name: str) -> Finding:
 
     def column(j: int) -> Callable[[float], Array]:
         def f(s: float) -> Array:
-            given = np.array(values)
-            given[j] += s * scales[j]
-            p, u = (case.p, given) if inputs else (given, case.u)
+            raw = np.array(values)
+            raw[j] += s * scales[j]
+            p, u = (case.p, raw) if inputs else (raw, case.u)
             return module.rhs(case.t, case.x, p=p, u=u)
 
         return f

@@ -74,13 +74,11 @@ class CheckedModel:
 
     def call(self, kernel: str, case: SystemState) -> Array:
         """A compiled kernel at a case; its result for one state."""
-        kernels, given = self.module.kernels, {"p": case.p, "u": case.u}
+        kernels, raw = self.module.kernels, {"p": case.p, "u": case.u}
         takes = NAMED[kernel].inputs
         if takes == ("q", "v", "a"):
-            return np.asarray(kernels.kernel(kernel)(case.q, case.v, case.a, **given, t=case.t))
-        return np.asarray(
-            kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **given, t=case.t)
-        )
+            return np.asarray(kernels.kernel(kernel)(case.q, case.v, case.a, **raw, t=case.t))
+        return np.asarray(kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **raw, t=case.t))
 
     def rhs(self, case: SystemState) -> Array:
         """x'."""

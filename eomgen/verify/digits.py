@@ -178,8 +178,8 @@ def _each(mp: Any, outputs: list[Expr], names: Sequence[str]) -> Any:
     """The law of a pair on arrays of such numbers: one pair after the other."""
     evaluate = Digits(mp, outputs)
 
-    def value(given: Sequence[Any]) -> list[Any]:
-        rows = np.broadcast_arrays(*given)
+    def value(raw: Sequence[Any]) -> list[Any]:
+        rows = np.broadcast_arrays(*raw)
         shape = rows[0].shape
         result = [evaluate(dict(zip(names, one, strict=True))) for one in zip(*(r.ravel() for r in rows), strict=True)]
         made = np.empty((len(outputs), len(result)), dtype=object)
@@ -208,9 +208,9 @@ FOLDED = 16.0 * EPS
 Pair = tuple[Array, Array]  # value, bound of its error
 
 
-def _apply(row: Operation, given: Sequence[Pair]) -> Pair:
+def _apply(row: Operation, raw: Sequence[Pair]) -> Pair:
     """An operation and its bound: of first order where the row does not know better, and its own rounding."""
-    x, e = [a for a, _ in given], [error for _, error in given]
+    x, e = [a for a, _ in raw], [error for _, error in raw]
     y = row.array(*x)
     if row.error is not None:
         bound = row.error(y, x, e)
@@ -260,27 +260,27 @@ def bounded(outputs: Sequence[Expr], values: Mapping[str, Array], count: int) ->
     return np.array([result[y.id][0] for y in outputs]), np.array([result[y.id][1] for y in outputs])
 
 
-def _called(function: Callable[..., Any], given: Sequence[Pair]) -> tuple[Any, Any]:
+def _called(function: Callable[..., Any], raw: Sequence[Pair]) -> tuple[Any, Any]:
     """A declared function; its slopes are estimated by differences."""
-    at = [a for a, _ in given]
+    at = [a for a, _ in raw]
     value = np.asarray(function(*at), dtype=float)
     bound = 8.0 * UNIT * abs(value)  # a cubic and its weights
-    for k, (a, error) in enumerate(given):
+    for k, (a, error) in enumerate(raw):
         shift = NUDGE * (1.0 + abs(a))
         up, down = (np.asarray(function(*at[:k], a + s, *at[k + 1 :]), dtype=float) for s in (shift, -shift))
         bound = bound + abs(up - down) / (2.0 * shift) * error
     return value, bound
 
 
-def _of_pairs(call: PairCall, given: Sequence[Any]) -> Any:
+def _of_pairs(call: PairCall, raw: Sequence[Any]) -> Any:
     """A node of a sum over pairs: lists of values and bounds, whose slopes are estimated by differences."""
     if call.part == "given":
-        return list(given)
+        return list(raw)
     if call.part == "item":
-        return given[0][call.numbers[0]]
-    operands = [*given[0], *given[1:]]  # of a slope the rates follow
+        return raw[0][call.numbers[0]]
+    operands = [*raw[0], *raw[1:]]  # of a slope the rates follow
     function = call.implementation(())
-    count = len(given[0])
+    count = len(raw[0])
 
     def value(at: Sequence[Any]) -> np.ndarray:
         return np.asarray(function(list(at[:count]), *at[count:]), dtype=float)

@@ -303,8 +303,8 @@ def _scales(module: BoundModel, c: SystemState, by: str) -> Array:
 
 def _along(module: BoundModel, c: SystemState, by: str, j: int, scale: float) -> Callable[[float], Array]:
     def f(s: float) -> Array:
-        given = {"x": np.array(c.x), "u": np.array(c.u), "p": np.array(c.p)}
-        given[by][j] += s * scale
-        return module.rhs(c.t, given["x"], p=given["p"], u=given["u"])
+        raw = {"x": np.array(c.x), "u": np.array(c.u), "p": np.array(c.p)}
+        raw[by][j] += s * scale
+        return module.rhs(c.t, raw["x"], p=raw["p"], u=raw["u"])
 
     return f

@@ -34,7 +34,7 @@ SLOWEST = 1e-3  #: rate (1/s) below which nothing changes
 # -- states ----------------------------------------------------------------------------------------------------------
 CLOSED = 1e-9  #: scaled residual of a state that counts as closed
 #: Least part of the largest singular value of J, and of the freedoms' in coordinates, of a state that is regular.
-REGULAR = 1e-3
+WELL_CONDITIONED = 1e-3
 #: Rounding of a result over its size, at least: 45 eps.
 ROUNDED = 1e-14
 

@@ -13,7 +13,7 @@ from ..base.algebra import Array
 from ..base.kernel_table import TIMED
 from ..base.limits.numbers import EPS
 from ..errors import EomgenError
-from .limits import BUILDS, CLOSED, REGULAR, SPREAD_OF_ROUNDING, ZERO
+from .limits import BUILDS, CLOSED, SPREAD_OF_ROUNDING, WELL_CONDITIONED, ZERO
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -157,7 +157,7 @@ def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
     J = scales.jacobian(module.kernels.constraint_jacobian(q, p=p, u=u, t=t))
     values = algebra.singular_values(J)
     rank = module.layout.n_v - module.layout.n_dof
-    return bool(values[rank - 1] > REGULAR * values[0]) if rank and rank <= len(values) else True
+    return bool(values[rank - 1] > WELL_CONDITIONED * values[0]) if rank and rank <= len(values) else True
 
 
 # -- recorded calls ----------------------------------------------------------------------------------------------------
@@ -191,8 +191,8 @@ CALLS: dict[str, Callable[[SystemState], tuple[Any, ...]]] = {
 def called(module: BoundModel, call: str, case: SystemState) -> Array:
     """What a call of a module gives at a state; of one that is not in the table at its position."""
     arguments = CALLS[call](case) if call in CALLS else (case.q,)
-    given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
-    return np.asarray(getattr(module, call)(*arguments, **given), dtype=float)
+    raw: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
+    return np.asarray(getattr(module, call)(*arguments, **raw), dtype=float)
 
 
 def record_calls(name: str, module: BoundModel | None) -> str:
@@ -225,7 +225,7 @@ def record_calls(name: str, module: BoundModel | None) -> str:
 
 def _record(module: BoundModel, call: str, case: SystemState, number: int) -> dict[str, Any] | None:
     """One call at one state; None where the model has no such result, or none that is finite."""
-    given: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
+    raw: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
     rng = np.random.default_rng(SEED)
     try:
         values = [called(module, call, case)]
@@ -237,7 +237,7 @@ def _record(module: BoundModel, call: str, case: SystemState, number: int) -> di
     if not values[0].size or not all(np.isfinite(value).all() for value in values):
         return None
     arguments = [value.tolist() if isinstance(value, np.ndarray) else float(value) for value in CALLS[call](case)]
-    plain = {key: np.asarray(value).tolist() for key, value in given.items()}
+    plain = {key: np.asarray(value).tolist() for key, value in raw.items()}
     named = {"id": f"{call}-{number}", "call": call, "arguments": arguments, "given": plain}
     return named | _judged(values[0], values[1:])
 

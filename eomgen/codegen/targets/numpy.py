@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...errors import cannot
-from ...expr.functions import Function, Twin
+from ...expr.functions import Function, PythonFallback
 from ...expr.without_gc import timed, without_gc
 from ...toolchain.load import load_numpy
 from ..c import closed_at
@@ -42,13 +42,13 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
     return imports, definitions
 
 
-def twins(program: Program) -> dict[str, Twin]:
+def twins(program: Program) -> dict[str, PythonFallback]:
     """Python twins of the native functions a program calls, by the names that the NumPy module uses."""
     result = {}
     for f, _ in used_calls(program).values():
         if f.native is not None:
             fallback = f.require_evaluator()
-            assert isinstance(fallback, Twin)
+            assert isinstance(fallback, PythonFallback)
             result[f"call_{f.name}"] = fallback
     return result
 

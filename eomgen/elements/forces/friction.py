@@ -384,10 +384,10 @@ FRICTION_CHOICE: Fields = {
 _PLAIN = ("stribeck", "smoothing", "transition", "bristle_stiffness", "bristle_damping")
 
 
-def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool = False) -> LineFriction | None:
+def read_friction(e: Entry, dynamic: str, static: str, viscous: str, only: bool = False) -> LineFriction | None:
     """Dry friction from the keys of its parts; None without Coulomb's part, beside which viscous may stand alone."""
     if dynamic not in e.values:
-        for key in (static, "friction_law", *_PLAIN, *(() if alone else (viscous,))):
+        for key in (static, "friction_law", *_PLAIN, *(() if only else (viscous,))):
             if key in e.values:
                 e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out", "EG-MISSING")
         return None
@@ -398,7 +398,7 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     else:
         e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
     along = e[viscous]
-    if along is not None and not alone:
+    if along is not None and not only:
         e.require(viscous, along, NOT_NEGATIVE, "must be 0 or greater")
     drag = e.graph.zero if along is None else along
     if kind == "brown_mcphee":
@@ -631,7 +631,7 @@ def _joint_friction(e: Entry) -> Force | None:
     for key in BY_REACTION:
         if key in e.values:
             e.fault(key, "is given without coefficient", f"give coefficient, or leave {key} out", "EG-MISSING")
-    dry = read_friction(e, "coulomb", "static", "viscous", alone=True)
+    dry = read_friction(e, "coulomb", "static", "viscous", only=True)
     if dry is None and "viscous" not in e.values and not e.at_fault():
         remedy = "give viscous, coulomb with smoothing, coefficient with smoothing, or several"
         e.fault("", "has no friction law", remedy, "EG-MISSING")

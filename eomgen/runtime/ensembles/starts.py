@@ -236,14 +236,16 @@ class SideBySide:
         n, rank = layout.n_v, layout.rank
         J, raw = self.jacobian(runs)
         steep = np.linalg.svd(J, compute_uv=False)
-        regular = ((steep > STRUCTURE * steep[:, :1]).sum(axis=1) == rank) & (steep[:, rank - 1] > GONE * steep[:, 0])
+        determined = ((steep > STRUCTURE * steep[:, :1]).sum(axis=1) == rank) & (
+            steep[:, rank - 1] > GONE * steep[:, 0]
+        )
         x, free = (v[:, runs] / self.sizes[:n, runs]).T, np.setdiff1d(np.arange(n), held)
         rest = (self.C_t(np.concatenate([self.q[:, runs], 0.0 * x.T]), **raw) / self.sizes[n:, runs]).T
         inverse = np.asarray(np.linalg.pinv(J[:, :, free], rcond=GIVEN), dtype=float)
         for _ in range(2):
             x[:, free] -= _times(inverse, _times(J, x) + rest)
         speed = np.abs(np.hstack([x[:, : layout.moving], rest])).max(axis=1, initial=1.0)
-        self.good[runs] = regular & (np.abs(_times(J, x) + rest).max(axis=1) <= CONTRADICTION * speed)
+        self.good[runs] = determined & (np.abs(_times(J, x) + rest).max(axis=1) <= CONTRADICTION * speed)
         v[:, runs] = x.T * self.sizes[:n, runs]
         return v
 
@@ -265,22 +267,22 @@ def _assemble_side_by_side(module: BoundModel, varied: Variations, t: float) -> 
     declared, late, raw = (
         [entries.index(name) for name in names] for names in (layout.info.initial, now, varied.values)
     )
-    first, moved, asked = ([i for i in places if i < n_q] for places in (declared, late, raw))
-    if (t and layout.n_c) or (layout.n_h and moved and asked):
+    first, moved, wanted = ([i for i in places if i < n_q] for places in (declared, late, raw))
+    if (t and layout.n_c) or (layout.n_h and moved and wanted):
         return numbers, np.zeros(varied.count, dtype=bool)
     starts.good &= np.isfinite(numbers).all(axis=0)
     if not layout.n_h:
-        starts.q[first + asked] = numbers[first + asked]
+        starts.q[first + wanted] = numbers[first + wanted]
     else:
         for i in first:
             starts.q[i] = layout.info.initial[entries[i]]
         starts.close(first, np.flatnonzero(starts.good))
         if moved:
             starts.lead(first, numbers[first])
-        elif asked:
-            held = starts.independent(layout.n_h, asked, [i for i in first if i not in asked])
+        elif wanted:
+            held = starts.independent(layout.n_h, wanted, [i for i in first if i not in wanted])
             starts.lead(held, numbers[held])
-    rates, asked = ([i - n_q for i in places if i >= n_q] for places in (declared, raw))
+    rates, wanted = ([i - n_q for i in places if i >= n_q] for places in (declared, raw))
     if raw:
-        rates = starts.independent(layout.n_c, asked, [i for i in rates if i not in asked])
+        rates = starts.independent(layout.n_c, wanted, [i for i in rates if i not in wanted])
     return np.concatenate([starts.q, starts.velocities(rates, numbers[n_q:])]), starts.good

@@ -490,9 +490,9 @@ def step_rigidly(
         )
     counts: dict[str, Any] = {"nfev": 2 * steps.taken, "steps": steps.taken, **met}
     ends = (start, end)
-    stored_times, found_states = (times, states) if stored is None else (stored, _between(times, states, stored))
+    stored_times, states_between = (times, states) if stored is None else (stored, _between(times, states, stored))
     dense = partial(_between, times, states)
-    solution = Solution(stored_times, found_states, [], [], dense, 0, "The end of the span is reached.", counts, ends)
+    solution = Solution(stored_times, states_between, [], [], dense, 0, "The end of the span is reached.", counts, ends)
     settings = {"step": h, "contact_tolerance": tolerance, "contact_iterations": iterations, "contact_forces": keep}
     run = record(bound, forcing, solution, NAME, settings)
     info = module.info

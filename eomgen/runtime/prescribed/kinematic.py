@@ -164,7 +164,7 @@ def keep(
     parts: Sequence[tuple[Array, Array, Array]],
     result: Sequence[Singular],
     stop: Singular | None,
-    asked: int,
+    requested: int,
     led: tuple[str, ...],
     *,
     u: Array | None = None,
@@ -172,7 +172,7 @@ def keep(
     passed: tuple[Any, ...] | None = None,
     rest: tuple[Any, ...] = (),
 ) -> KinematicAnalysis:
-    """Put an analysis together from its pieces; ``asked`` points were asked for.
+    """Put an analysis together from its pieces; ``requested`` points were asked for.
 
     ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``passed`` what was
     passed besides these points, as columns take it, ``rest`` what a Trajectory takes after its header.
@@ -184,7 +184,7 @@ def keep(
         u = np.repeat(module.u[:, None], len(t), axis=1)
     columns = MotionColumns(module, t, x, u, a, passed)
     span = [float(t[0]), float(t[-1])] if t.size else []
-    status, message = (0, "the whole range") if stop is None else (-1, f"{len(t)} of {asked} points: {stop}")
+    status, message = (0, "the whole range") if stop is None else (-1, f"{len(t)} of {requested} points: {stop}")
     more = {"led": list(led), "singular": [str(s) for s in result]}
     known = header_of(module.layout, METHOD, {}, (), residuals(module, t, x), status, message, more, span)
     complete = {**describe(module), **known, **(header or {})}
