@@ -64,11 +64,11 @@ def contact_columns(terms: SystemTerms) -> ContactColumns | None:
         call = pair_call(graph, graph.nodes[i][0])
         if call is None or call.part != "sum" or not call.function.states:
             continue
-        function, raw = call.function, graph.nodes[graph.nodes[i][1]][1:]
+        function, arguments = call.function, graph.nodes[graph.nodes[i][1]][1:]
         start, first = POSE * function.bodies, function.first_state
         places = tuple(k for k in range(first) if k < start or function.data[k - start] is None)
-        sums.append(StatedSum(function, places, tuple(index.get(k, -1) for k in raw[first:])))
-        operands += [Expr(graph, raw[k]) for k in places]
+        sums.append(StatedSum(function, places, tuple(index.get(k, -1) for k in arguments[first:])))
+        operands += [Expr(graph, arguments[k]) for k in places]
     if len({one.function.name for one in sums}) < len(sums):
         return None
     result = _dependences(graph, order, sums, index)

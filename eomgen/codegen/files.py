@@ -131,7 +131,7 @@ def _followed(program: Program, q: list[float], v: Array, dependent: list[int]) 
     none = np.zeros(len(dependent))
     rows = [y for block in program.blocks if block.name == "velocity_constraints" for y in block.outputs]
     values = [program.metadata[key] for key in ("p_values", "u_values")]
-    if not rows or any(x is None for raw in values for x in raw):
+    if not rows or any(x is None for row in values for x in row):
         return none
     names = [*program.coordinates, *program.velocities, *program.parameters, *program.inputs, program.time]
     try:

@@ -292,5 +292,5 @@ class LoopSlopes:
         mapping = dict(zip(self.coefficients, self.terms.symbols(self.names), strict=True))
         which = BY_BODIES.index(name) - 1
         changes = substitute(self._columns[which], mapping)
-        raw = (Port("coefficients", self.names), ports[2 + which])
-        return Block(name, raw, tuple(changes), (len(changes),), public=False)
+        arguments = (Port("coefficients", self.names), ports[2 + which])
+        return Block(name, arguments, tuple(changes), (len(changes),), public=False)

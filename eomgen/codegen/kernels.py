@@ -316,8 +316,8 @@ class BlockMaker:
 
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
-        raw = (*RATES, *(("coordinate_slopes",) if self.terms.coordinate_slopes else ()))
-        return (*self._behind(name), *(raw if self.terms.general_rates else ()))
+        more = (*RATES, *(("coordinate_slopes",) if self.terms.coordinate_slopes else ()))
+        return (*self._behind(name), *(more if self.terms.general_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
         if name in ALONG:
@@ -410,12 +410,12 @@ class BlockMaker:
                 ports, results = self.contacts.block(name, terms)
                 return block(name, ports, results, self._turned if name == "contact_terms" else ())
             case "dae_tangent":  # dF along (dy, dy')
-                raw = [self.port(port) for port in DAE]
-                y = [symbol for port in raw for symbol in port.symbols]
+                ports = [self.port(port) for port in DAE]
+                y = [symbol for port in ports for symbol in port.symbols]
                 along = Port("directions", tuple(f"d({symbol})" for symbol in y))
                 seeds = dict(zip(terms.symbols(y), terms.symbols(along.symbols), strict=True))
                 results = jvp(_dae_residual(terms), seeds)
-                return Block(name, (*raw, along), tuple(results), (len(results),), public=False)
+                return Block(name, (*ports, along), tuple(results), (len(results),), public=False)
             case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
                 seeds = self._seeds("q", "v", "a")
                 return block(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))

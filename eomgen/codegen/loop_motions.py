@@ -176,18 +176,18 @@ class MotionLoops(LoopBlocks):
 
     def _moved(self, conditions: list[Expr]) -> list[Expr]:
         v = self.terms.symbols(self.terms.v)
-        raw, _ = self._particular([-x for x in self.scaled(self.terms.constraint_rate)])
+        particular, _ = self._particular([-x for x in self.scaled(self.terms.constraint_rate)])
         y = [v[k] for k in self.terms.preferred]
-        missed = [a - b - c for a, b, c in zip(v, raw, times(self._motions, y), strict=True)]
+        missed = [a - b - c for a, b, c in zip(v, particular, times(self._motions, y), strict=True)]
         y = [a + b for a, b in zip(y, self._along(missed), strict=True)]
-        return [a + b for a, b in zip(raw, times(self._motions, y), strict=True)]
+        return [a + b for a, b in zip(particular, times(self._motions, y), strict=True)]
 
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
         terms = self.terms
         here = substitute([*terms.bias, *terms.gamma], moved)
         gamma = self.scaled(here[terms.n_v :])
-        raw, _ = self._particular([-x for x in gamma])
-        a, checks = embedded_accelerations(terms, self._motions, raw, here[: terms.n_v], self._legs)
+        particular, _ = self._particular([-x for x in gamma])
+        a, checks = embedded_accelerations(terms, self._motions, particular, here[: terms.n_v], self._legs)
         conditions += self._follows()
         if self._in_a_row:  # else columns tell already that no change point is near
             columns = self.all_of(self._across(CROSSINGS_NEAR_SQUARE))

@@ -55,9 +55,9 @@ def keep_rules(requirements: Sequence[Requirement], names: Sequence[str]) -> dic
     ranges: list[list[Any]] = []
     rules: list[list[Any]] = []
     for path, rule, numbers, data, local in requirements:
-        kind, *raw = numbers[0].node
-        if rule == RANGE and kind == "sym" and raw[0] in names:
-            ranges.append([names.index(raw[0]), path, *data])
+        kind, *operands = numbers[0].node
+        if rule == RANGE and kind == "sym" and operands[0] in names:
+            ranges.append([names.index(operands[0]), path, *data])
             continue
         places = {name: ("p", k) for k, name in enumerate(names)} | {name: ("x", k) for k, name in enumerate(local)}
         used = sorted(names.index(name) for name in symbols_of(numbers) - {*local})
@@ -75,16 +75,16 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     model, which no tape can play, with the places of their parameters.
     """
     m = kinematics.mechanism
-    raw = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
+    sources = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
     values = {p.name: p.value for p in m.parameters}
-    result: dict[str, Any] = {key: initial_values(kinematics, values, key) for key in raw}
+    result: dict[str, Any] = {key: initial_values(kinematics, values, key) for key in sources}
     if bad := [(key, name) for key, of in result.items() for name, x in of.items() if not isfinite(x)]:
         what = "is no number at the declared parameters"
         raise ModelError(
             [m.problem(f"{key.partition('_')[0]}.{name}", what, TO_BE_FINITE, "EG-NOT-FINITE") for key, name in bad]
         )
     places = {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)}
-    unbound = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in raw.items()}
+    unbound = {key: {n: x for n, x in terms.items() if symbols_of([x])} for key, terms in sources.items()}
     fixed = {n: x for terms in unbound.values() for n, x in terms.items() if not _is_of_operations(x)}
     unbound = {key: {n: x for n, x in terms.items() if n not in fixed} for key, terms in unbound.items()}
     if fixed:
@@ -282,14 +282,14 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
 
 def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:
     """Inputs over time as tapes, by name, and their derivatives by t, x and p that do not vanish."""
-    raw = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
-    if not raw:
+    signals = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
+    if not signals:
         return {}
     states = (*kinematics.names, *kinematics.velocity_names, *kinematics.state_names)
     places = {name: ("x", k) for k, name in enumerate(states)}
     places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
     known = [kinematics.graph.symbol(name) for name in ("t", *states, *kinematics.parameter_names)]
-    result = dict(zip(raw, resolved(list(raw.values()), kinematics, equations), strict=True))
+    result = dict(zip(signals, resolved(list(signals.values()), kinematics, equations), strict=True))
     slopes: dict[str, Any] = {}
     for name, x in result.items():
         kept = {k: slope for k, slope in enumerate(gradient(x, known)) if not slope.is_zero}

@@ -227,16 +227,16 @@ class PairLists:
             if any(x is not None for x in function.data[count:]):  # counts of pieces that touch, among states
                 heads.append(f"for (int i = 0; i < {function.states}; i++) {{ w[{start + count} + i] = same(0.0); }}")
             return [*heads, *filled]
-        raw = self._places[operands[0]]
+        source = self._places[operands[0]]
         if call.part == "witnesses":
-            return [f"pairs_{function.name}_witnesses(w + {raw}, w + {place}, w + {work});"]
+            return [f"pairs_{function.name}_witnesses(w + {source}, w + {place}, w + {work});"]
         if call.part == "sum":
-            return [f"pairs_{function.name}_sum(w + {raw}, w + {place}, w + {work});"]
+            return [f"pairs_{function.name}_sum(w + {source}, w + {place}, w + {work});"]
         if call.part == "meeting":
             after = f"w + {place + MEETING}, w + {place}, w + {work}"
-            return [*filled, f"pairs_{function.name}_meeting(w + {raw}, {after});"]
+            return [*filled, f"pairs_{function.name}_meeting(w + {source}, {after});"]
         rates = self._rates[function.name]
-        along, room = f"w + {raw}, w + {rates}, w + {place}", self.again.get(function.name)
+        along, room = f"w + {source}, w + {rates}, w + {place}", self.again.get(function.name)
         slope = f"slope({along}, w + {work})" if room is None else f"again({along}, {room})"
         return [
             f"memset(w + {rates}, 0, {function.count} * sizeof *w);",

@@ -47,12 +47,12 @@ def solve_multipliers(rows: Sequence[Sequence[Expr]], forces: Sequence[Expr]) ->
 
 def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
     """What the named multipliers of a model stand for."""
-    raw = kinematics.mechanism.given
-    if raw is None or not raw.multipliers:
+    written = kinematics.mechanism.given
+    if written is None or not written.multipliers:
         return {}
     graph = kinematics.graph
     values = solve_multipliers(kinematics.constraints.jacobian, equations.inverse_dynamics)
-    names = {f"constraint_{k + 1}": name for k, name in enumerate(raw.multipliers)}
+    names = {f"constraint_{k + 1}": name for k, name in enumerate(written.multipliers)}
     return {
         graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
     }

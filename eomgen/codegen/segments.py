@@ -210,8 +210,8 @@ class Segments:
         return sum(len(kind.members) * len(kind.members[0]) for kind in self.kinds)
 
 
-def find_segments(program: Program, block: Block, raw: Mapping[int, Place]) -> Segments:
-    """The segments of a block and the kinds that they are of; symbols and hoisted values are ``raw`` at places."""
+def find_segments(program: Program, block: Block, known_places: Mapping[int, Place]) -> Segments:
+    """The segments of a block and their kinds; symbols and hoisted values are at ``known_places``."""
     graph, nodes, skipped = program.graph, program.graph.nodes, program.made_before(block)
     longest = max(1, program.limits.statements // 2)
     places: dict[int, list[int]] = {}
@@ -222,9 +222,9 @@ def find_segments(program: Program, block: Block, raw: Mapping[int, Place]) -> S
     statements = [i for i in every if nodes[i][0] not in LEAVES and i not in skipped]
     kept = {*places, *checked}
     turning = [i for i in statements if nodes[i][0] in CIRCULAR and i not in kept]
-    turning = [i for i in turning if raw.get(nodes[i][1], ("", 0))[0] == "x"]
+    turning = [i for i in turning if known_places.get(nodes[i][1], ("", 0))[0] == "x"]
     angles = sorted({nodes[i][1] for i in turning})
-    known: dict[int, Place] = dict(raw)
+    known: dict[int, Place] = dict(known_places)
     known.update((i, ("const", nodes[i][1])) for i in every if nodes[i][0] == "const")
     slot = {a: k for k, a in enumerate(angles)}
     known.update((i, ("w", slot[nodes[i][1]] + (len(angles) if nodes[i][0] == "cos" else 0))) for i in turning)

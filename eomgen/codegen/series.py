@@ -100,7 +100,7 @@ class _Terms:
 
     def series(self, block: Block) -> Series:
         """All that is needed, once every node has its term; reciprocals may have gone into quotients."""
-        rates, checks = ([self._of[y.id] for y in raw] for raw in (block.outputs, block.checks))
+        rates, checks = ([self._of[y.id] for y in expressions] for expressions in (block.outputs, block.checks))
         states = {i for i, term in enumerate(self._terms) if term.kind == "state"}
         live = sorted(states | behind(self._terms, [*rates, *checks]))
         place = {i: k for k, i in enumerate(live)}

@@ -51,16 +51,16 @@ def switched_matrix(inner: Matrix, on: Sequence[Expr]) -> Matrix:
     return [[on[i] * inner[i][j] * on[j] + ((on[i] - 1.0) if i == j else 0.0) for j in size] for i in size]
 
 
-def solve_switched(raw: Matrix, right: Sequence[Sequence[Expr]]) -> list[list[Expr]]:
+def solve_switched(matrix: Matrix, right: Sequence[Sequence[Expr]]) -> list[list[Expr]]:
     """Solutions for a negative semidefinite matrix; a row that follows from those before it gets 0.
 
     There its pivot is rounding of its own diagonal, and so is all that is left of the row.
     """
-    graph, n, A = raw[0][0].graph, len(raw), [list(row) for row in raw]
+    graph, n, A = matrix[0][0].graph, len(matrix), [list(row) for row in matrix]
     columns, pivots = [list(column) for column in right], list[Expr]()
     own = []
     for k in range(n):
-        least = SINGULAR * graph.apply("abs", raw[k][k])
+        least = SINGULAR * graph.apply("abs", matrix[k][k])
         own.append(graph.apply("lt", least, graph.apply("abs", A[k][k])))
         pivots.append(where(own[k], A[k][k], 1.0))
         for i in range(k + 1, n):
@@ -105,19 +105,19 @@ class AfterEvents:
         switched = [s.state for s in k.mechanism.switched]
         result = dict[str, tuple[tuple[str, Expr], ...]]()
         for event in k.mechanism.events:
-            raw = dict(event.reset)
-            closes = any(raw.get(state) == k.graph.one for state in switched)
-            if closes or not moving.isdisjoint(raw):
+            reset = dict(event.reset)
+            closes = any(reset.get(state) == k.graph.one for state in switched)
+            if closes or not moving.isdisjoint(reset):
                 result[event.name] = tuple(zip(k.velocity_names, self._after(event, closes), strict=True))
         return result
 
     def _after(self, event: Event, closes: bool) -> list[Expr]:
-        k, raw = self.kinematics, dict(event.reset)
-        new = {k.graph.symbol(name): value for name, value in raw.items()}
+        k, reset = self.kinematics, dict(event.reset)
+        new = {k.graph.symbol(name): value for name, value in reset.items()}
         v = given_v = substitute(list(k.v), new)
-        own = [self._closed(row, raw, new) for row in self.rows]
+        own = [self._closed(row, reset, new) for row in self.rows]
         lasting = list[RowAfter]()
-        if not {*k.names, *k.velocity_names}.isdisjoint(raw):
+        if not {*k.names, *k.velocity_names}.isdisjoint(reset):
             lasting = self._lasting(own, new)
             held = [one._replace(on=row.on) for one, row in zip(own, self.rows, strict=True)] if closes else own
             acting = [*(lasting if len(lasting) <= MOST else ()), *held]
@@ -140,9 +140,9 @@ class AfterEvents:
         (impulses,) = solve_switched(A, [[-(one.on * rate) for one, rate in zip(acting, rates, strict=True)]])
         return [combined(before, [c[j] for c in columns], impulses) for j, before in enumerate(v)]
 
-    def _closed(self, row: SwitchedRow, raw: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
+    def _closed(self, row: SwitchedRow, reset: Mapping[str, Expr], new: Mapping[Expr, Expr]) -> RowAfter:
         """Equations that may be no numbers while they are open: those of what closes now."""
-        on = raw.get(row.state, row.on)
+        on = reset.get(row.state, row.on)
         rate, error, *J = substitute([row.rate, row.errors[0], *row.jacobian], new)
         before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
         return RowAfter(on, J, rate, error, error - before, self._size(row.kind))

@@ -350,9 +350,9 @@ def resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
     return result
 
 
-def resolved(raw: Sequence[Expr], kinematics: Kinematics, equations: TreeEquations) -> Row:
+def resolved(unresolved: Sequence[Expr], kinematics: Kinematics, equations: TreeEquations) -> Row:
     """Expressions in terms of the tree's q, v, a."""
-    expressions = kinematics.resolve(raw)
+    expressions = kinematics.resolve(unresolved)
     graph = kinematics.graph
     energies = {
         graph.symbol("kinetic_energy()"): equations.kinetic_energy,

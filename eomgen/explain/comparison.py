@@ -159,8 +159,8 @@ def compare(author: Author, module: Any) -> Difference:
         keys = {f"{name}[{part}]" if name in each else name: (name, part) for name, part in others}
         for what, key in keys.items():
             one = equations.as_formed(*key)
-            formed, raw = one.formed()
-            _compare_formed(result, what, formed, raw, (one.named, one.flat), values)
+            formed, named = one.formed()
+            _compare_formed(result, what, formed, named, (one.named, one.flat), values)
         for what, expressions, own in author.formed:
             _compare_formed(result, what, expressions, (), own, values)
     return Difference({name: one.finding().worst for name, one in result.items()}, STATES)
@@ -218,16 +218,16 @@ def _compare_formed(
     result: dict[str, Comparison],
     what: str,
     formed: Sequence[Expr],
-    raw: Sequence[tuple[str, Expr]],
+    named: Sequence[tuple[str, Expr]],
     written: tuple[Sequence[tuple[Any, Any]], Sequence[Any]],
     values: Mapping[str, float],
 ) -> None:
     """A formula in SymPy against the expressions of the derivation, evaluated on their graph."""
-    unknown = symbols_of([*formed, *(x for _, x in raw)]).difference(values, (name for name, _ in raw))
+    unknown = symbols_of([*formed, *(x for _, x in named)]).difference(values, (name for name, _ in named))
     random = np.random.default_rng(2)
     numbers = dict(values) | {name: float(random.uniform(-1, 1)) for name in sorted(unknown)}
     at = dict(numbers)
-    for name, x in raw:
+    for name, x in named:
         at[name] = float(of_graph([x], at)[0])
     wanted, terms = with_bounds(formed, at)
     _note(result, what, evaluate(*written, numbers), wanted, float(np.max(terms[np.isfinite(terms)], initial=0.0)))

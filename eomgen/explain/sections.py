@@ -119,8 +119,8 @@ def bodies(author: Author) -> Section | None:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:
             pieces += formulas
-    raw = [(p, "parameter") for p in m.parameters] + [(u, "input") for u in m.inputs]
-    if raw:
+    symbols = [(p, "parameter") for p in m.parameters] + [(u, "input") for u in m.inputs]
+    if symbols:
         rows = tuple(
             (
                 f"${author.symbol(p.name)}$",
@@ -129,7 +129,7 @@ def bodies(author: Author) -> Section | None:
                 _plain(p.unit),
                 (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
             )
-            for p, kind in raw
+            for p, kind in symbols
         )
         table = Table(("symbol", "name", "value", "unit", "meaning"), rows)
         pieces.append(Folded(f"Values of {len(rows)} parameters", (table,)) if m.bodies and len(rows) > MANY else table)

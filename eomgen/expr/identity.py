@@ -161,17 +161,17 @@ def dependence(
     outputs: Sequence[Expr],
     at: dict[str, np.ndarray],
     moved: Mapping[str, np.ndarray],
-    raw: Sequence[tuple[str, Expr]] = (),
+    named: Sequence[tuple[str, Expr]] = (),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Values and bounds (n, k) at k points, and (n, names) whether each output stays the same as a symbol moves alone.
 
-    ``moved`` has other values of symbols at the first points; names ``raw`` stand for expressions and join ``at``.
+    ``moved`` has other values of symbols at the first points; names ``named`` stand for expressions and join ``at``.
     """
     k, m = (len(next(iter(values.values()), ())) for values in (at, moved))
     wide = {name: np.concatenate([x, np.tile(x[:m], len(moved))]) for name, x in at.items()}
     for j, (name, x) in enumerate(moved.items()):
         wide[name][k + m * j : k + m * (j + 1)] = x
-    for name, expression in raw:
+    for name, expression in named:
         wide[name] = with_bounds([expression], wide)[0][0]
         at[name] = wide[name][:k]
     values, bounds = with_bounds(outputs, wide)

@@ -83,9 +83,9 @@ class _Init:
             self.kind.__init__ = _compile_init(self.kind, self.fields)
         return vars(self.kind)["__init__"]
 
-    def fill(self, record: Any, *raw: Any, **named: Any) -> None:
+    def fill(self, record: Any, *args: Any, **named: Any) -> None:
         """Set the fields; whatever does not fit is left to the compiled function, which says so."""
-        held, values, rest = vars(record), iter(raw), dict(named)
+        held, values, rest = vars(record), iter(args), dict(named)
         for field in self.fields:
             name = field.name
             value = next(values, dataclasses.MISSING)
@@ -94,11 +94,11 @@ class _Init:
                 if value is dataclasses.MISSING:
                     make: Any = field.default_factory
                     if make is dataclasses.MISSING:
-                        return self.compiled()(record, *raw, **named)  # type: ignore[no-any-return]
+                        return self.compiled()(record, *args, **named)  # type: ignore[no-any-return]
                     value = make()
             held[name] = value
-        if rest or len(raw) > len(self.fields):
-            return self.compiled()(record, *raw, **named)  # type: ignore[no-any-return]
+        if rest or len(args) > len(self.fields):
+            return self.compiled()(record, *args, **named)  # type: ignore[no-any-return]
         if hasattr(record, "__post_init__"):
             record.__post_init__()
         return None

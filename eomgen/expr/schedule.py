@@ -231,14 +231,14 @@ def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, i
         graph = expression.graph
         result: dict[int, int] = {}
         for i in reachable(graph, [expression.id]):
-            kind, *raw = graph.nodes[i]
+            kind, *operands = graph.nodes[i]
             if kind == "const":
                 code.append(("const", len(numbers), 0, 0))
-                numbers.append(float(raw[0]))
+                numbers.append(float(operands[0]))
             elif kind == "sym":
-                code.append((*place(raw[0]), 0, 0))
+                code.append((*place(operands[0]), 0, 0))
             elif kind in OPERATIONS:
-                a, b, c = (*(result[k] for k in raw), 0, 0)[:3]
+                a, b, c = (*(result[k] for k in operands), 0, 0)[:3]
                 code.append((kind, a, b, c))
             else:
                 raise cannot("functions of the model cannot be used in an input over time")

@@ -217,8 +217,8 @@ def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
     """The initial values, and a place beside them where nothing vanishes by chance."""
     graph, m = kinematics.graph, kinematics.mechanism
     inputs = {graph.symbol(u.name): graph.constant(u.value) for u in m.inputs}
-    raw = {**m.guess, **m.initial}
-    known = dict(zip(raw, substitute(list(raw.values()), inputs), strict=True))
+    declared = {**m.guess, **m.initial}
+    known = dict(zip(declared, substitute(list(declared.values()), inputs), strict=True))
     unit = {"length": kinematics.length_scale, "angle": graph.one}
     first: dict[Expr, Expr] = {}
     second: dict[Expr, Expr] = {}
@@ -327,29 +327,29 @@ class ConstraintFunctions:
 
     def close(
         self,
-        raw: Mapping[str, float],
+        declared: Mapping[str, float],
         guess: Mapping[str, float],
         restarts: int = RESTARTS,
         system: ConstraintSystem | None = None,
     ) -> Assembly:
         """Assemble with the given values exact, near the guess; with the rows of another system if there is one."""
         system = self.system if system is None else system
-        raw, guess = system.settle(raw), system.settle(guess)
-        start = system.with_values(system.with_values(self.neutral, guess), raw)
+        declared, guess = system.settle(declared), system.settle(guess)
+        start = system.with_values(system.with_values(self.neutral, guess), declared)
         rough = system.wanted(guess)
         if rough is not None:  # come near the guessed coordinates of cut joints first
-            start = close(system.closure(raw)._replace(equations=rough), start)[0]
-        return system.close(self._hinted(start, {**raw, **guess}, system.t), raw, restarts)
+            start = close(system.closure(declared)._replace(equations=rough), start)[0]
+        return system.close(self._hinted(start, {**declared, **guess}, system.t), declared, restarts)
 
-    def close_nearest(self, raw: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    def close_nearest(self, declared: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
         """Assemble with the given values exact, on the branch that is nearest to the guess."""
-        settled = self.system.settle(raw), self.system.settle(guess)
+        settled = self.system.settle(declared), self.system.settle(guess)
         known = {**settled[0], **settled[1]}
         if guess:
             result = close_nearest(self.system, self.neutral, *settled, lambda q: self._hinted(q, known, self.system.t))
             if result is not None:
                 return result
-        return self.close(raw, guess)
+        return self.close(declared, guess)
 
     def _hinted(self, q: Array, known: Mapping[str, float], t: float) -> Array:
         """A position with the coordinates of contact points that nobody knows where they may be."""

@@ -249,9 +249,9 @@ class Resolved:
         """As they are."""
         return cls(tuple(links), tuple(twists), rates, applied, (None,) * len(links))
 
-    def inertias(self, raw: Sequence[SpatialInertia]) -> list[SpatialInertia]:
+    def inertias(self, spatial: Sequence[SpatialInertia]) -> list[SpatialInertia]:
         """Inertias in link axes -> in these axes."""
-        return [i if axes is None else i.turned(axes) for i, axes in zip(raw, self.axes, strict=True)]
+        return [i if axes is None else i.turned(axes) for i, axes in zip(spatial, self.axes, strict=True)]
 
     def with_columns(self, links: Sequence[Link]) -> Resolved:
         """The same with other columns, of these links."""

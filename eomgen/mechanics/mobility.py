@@ -145,15 +145,15 @@ def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
     return {i: name for i, name in result.items() if name in names}
 
 
-def close_driven(functions: ConstraintFunctions, raw: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+def close_driven(functions: ConstraintFunctions, values: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
     """Assemble at t = 0; where that fails for the drivers, or more of them than freedoms contradict, say so."""
     drivers = driver_rows(functions)
     try:
-        result = functions.close_nearest(raw, guess)
+        result = functions.close_nearest(values, guess)
     except AssemblyError as error:
         if not drivers:
             raise
-        raise _explain(functions, drivers, raw, guess, error) from None
+        raise _explain(functions, drivers, values, guess, error) from None
     if drivers:
         _refuse_contradictions(functions, drivers, result.q)
     return result
@@ -205,14 +205,14 @@ def _needed(
 def _explain(
     functions: ConstraintFunctions,
     drivers: Mapping[int, str],
-    raw: Mapping[str, float],
+    wanted: Mapping[str, float],
     guess: Mapping[str, float],
     error: AssemblyError,
 ) -> AssemblyError | ModelError:
     """Why the mechanism cannot be assembled with its drivers."""
     free = functions.with_rows(_others(functions, list(drivers)))
     try:
-        q = functions.close(raw, guess, system=free).q
+        q = functions.close(wanted, guess, system=free).q
     except AssemblyError as loops:
         return loops  # not for the drivers' sake
     with np.errstate(all="ignore"):
@@ -228,14 +228,14 @@ def _explain(
     kept, spare = _needed(functions, drivers, q)
     if spare:
         try:
-            q = functions.close(raw, guess, system=functions.with_rows(kept)).q
+            q = functions.close(wanted, guess, system=functions.with_rows(kept)).q
         except AssemblyError:
             pass
         else:
             return _contradiction(functions, drivers, spare, q, 0.0)
-    if raw:
+    if wanted:
         try:
-            functions.close({}, {**guess, **raw})
+            functions.close({}, {**guess, **wanted})
         except AssemblyError:
             pass
         else:
@@ -357,9 +357,9 @@ def initial_values(
     kinematics: Kinematics, values: Mapping[str, float | None], which: str = "initial"
 ) -> dict[str, float]:
     """Declared initial values (or guesses) as numbers, by name, with those of parameters."""
-    raw: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
-    numbers = Evaluator(list(raw.values()), tuple(values))(list(values.values())) if raw else []
-    return {name: float(x) for name, x in zip(raw, numbers, strict=True)}
+    wanted: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
+    numbers = Evaluator(list(wanted.values()), tuple(values))(list(values.values())) if wanted else []
+    return {name: float(x) for name, x in zip(wanted, numbers, strict=True)}
 
 
 def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:

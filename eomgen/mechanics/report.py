@@ -57,13 +57,13 @@ def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str,
     functions = ConstraintFunctions(kinematics, numbers)
     system, here = functions.system, np.array(mobility.q_reference)
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
-    raw = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
+    initial = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
     kinds = dict(zip(kinematics.names, kinematics.kinds, strict=True))
     guessed = [name for name in mechanism.guess if name in known and kinds.get(name) != "parameter"]
     held = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
     at = dict(zip(kinematics.names, mobility.q_reference, strict=True))
     held |= {name: at[name] for name in mobility.independent if name in at}
-    equations, names = system.closure(system.settle({**held, **raw})), [n for n in single if n in known]
+    equations, names = system.closure(system.settle({**held, **initial})), [n for n in single if n in known]
     values, _ = system.measure(names, here)
     sizes, angles = _sizes(functions, names)
     result: list[Array] = []
@@ -164,12 +164,12 @@ def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     numbers = {p.name: p.value for p in m.parameters} | {u.name: u.value for u in m.inputs}
     if mobility.assumed:
         return []
-    raw = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
+    starts = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
     names = (*kinematics.names, *kinematics.loop_coordinates.names)
     kinds = dict(zip(names, (*kinematics.kinds, *kinematics.loop_coordinates.kinds), strict=True))
     return [
         angle_in_degrees(name, x)
-        for name, x in raw.items()
+        for name, x in starts.items()
         if kinds.get(name) in ("angle", "turn") and abs(x) > MOST_ANGLE
     ]
 

@@ -178,9 +178,9 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)
     rates = {n for spec in joints for n, v in zip(spec.velocities, spec.joint.velocities, strict=True) if v.of is None}
-    raw = rates.intersection(mechanism.initial)
-    raw |= {str(c.coordinate.node[1]) for c in mechanism.constraints if isinstance(c, CoordinateDriver)}
-    rank = [_rank(spec, independent, raw) for spec in joints]
+    declared = rates.intersection(mechanism.initial)
+    declared |= {str(c.coordinate.node[1]) for c in mechanism.constraints if isinstance(c, CoordinateDriver)}
+    rank = [_rank(spec, independent, declared) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))
     tree = {k for k in order if joints[k].joint.role != "loop" and forest.join(*_ends(joints[k]))}
     branches = _walk(n, joints, tree)
@@ -273,10 +273,12 @@ class MotionSymbols:
 def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
     """The coordinates and velocities of the tree, in its order."""
     if mechanism.given is not None:
-        raw, n = mechanism.given, len(mechanism.given.velocities)
-        rates = () if raw.rates == tuple(map(mechanism.graph.symbol, raw.velocities)) else raw.rates
-        angles, turns = ("angle",) * len(raw.coordinates), ("angle",) * n
-        return StateLayout(raw.coordinates, angles, raw.velocities, turns, tuple(range(-1, n - 1)), given=rates)
+        equations, n = mechanism.given, len(mechanism.given.velocities)
+        rates = () if equations.rates == tuple(map(mechanism.graph.symbol, equations.velocities)) else equations.rates
+        angles, turns = ("angle",) * len(equations.coordinates), ("angle",) * n
+        return StateLayout(
+            equations.coordinates, angles, equations.velocities, turns, tuple(range(-1, n - 1)), given=rates
+        )
     names_list: list[str] = []
     kinds_list: list[str] = []
     velocity_names: list[str] = []

@@ -131,7 +131,7 @@ class ReadingView(Displayed):
     def __init__(self, source: Displayed, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
         self.source: Displayed = source.source if isinstance(source, ReadingView) else source
         self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbol, self._put_in = symbols, tuple(raw for raw in values if raw)
+        self._symbol, self._put_in = symbols, tuple(mapping for mapping in values if mapping)
 
     def fresh(self) -> Derived:
         return self.source.fresh()
@@ -155,7 +155,7 @@ class ReadingView(Displayed):
             return self.source.explain(level)  # type: ignore[attr-defined]
         k = self.kinematics
         known = {*k.parameter_names, *k.input_names}
-        moving = sorted({name for raw in self._put_in for name in raw}.difference(known))
+        moving = sorted({name for mapping in self._put_in for name in mapping}.difference(known))
         strange = sorted({*self.names_substituted}.difference(known))
         if moving:
             raise UnavailableError(

@@ -169,9 +169,9 @@ class _Code:
 
     def _c(self) -> list[str]:
         n = self.mass.rows
-        raw = "".join(f"double {name}, " for name in self.arguments)
+        arguments = "".join(f"double {name}, " for name in self.arguments)
         more = f", double state_rates[{len(self.states)}]" if self.states else ""
-        head = f"void {self.function}({raw}double M[{n}][{n}], double f[{n}]{more})"
+        head = f"void {self.function}({arguments}double M[{n}][{n}], double f[{n}]{more})"
         body = self._body("  {} = {};", lambda at: "".join(f"[{k}]" for k in at), 0, named="  const double {} = {};")
         return ["#include <math.h>", head, "{", *body, "}"]
 

@@ -52,9 +52,9 @@ def momentum_names(kinematics: Kinematics) -> tuple[str, ...]:
 
 def multiplier_names(kinematics: Kinematics, count: int) -> tuple[str, ...]:
     """``lambda_1``, ...: what multipliers of constraint equations are called, unless given equations name them."""
-    raw = kinematics.mechanism.given
-    if raw is not None and count == len(raw.multipliers):
-        return raw.multipliers
+    equations = kinematics.mechanism.given
+    if equations is not None and count == len(equations.multipliers):
+        return equations.multipliers
     return _free(kinematics, MULTIPLIERS, lambda word: numbered(word, count))
 
 
@@ -107,16 +107,16 @@ def read_value(graph: Graph, name: str, value: Any) -> Expr:
         raise ill_typed(f"{name} must be a number, a text or a SymPy expression, not {quoted(value)}") from None
 
 
-def read_values(raw: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
+def read_values(by_name: Any, allowed: Sequence[str], what: str, plain: Callable[[str], str]) -> dict[str, Any]:
     """Values by name; refused are unknown names, those given twice, and values that are no expressions.
 
     ``what`` is what the names are, in messages; ``plain`` makes ``left_hinge`` of ``left.hinge`` in an instance of a
     component.
     """
-    if not isinstance(raw, Mapping):
-        raise ill_typed(f"values are given by name, as a mapping does, not {quoted(raw)}")
+    if not isinstance(by_name, Mapping):
+        raise ill_typed(f"values are given by name, as a mapping does, not {quoted(by_name)}")
     values: dict[str, Any] = {}
-    for key, value in raw.items():
+    for key, value in by_name.items():
         name = name_of(key)
         name = plain(name) if isinstance(name, str) and name not in allowed else name
         if name not in allowed:

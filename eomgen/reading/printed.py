@@ -203,8 +203,8 @@ class PrintedEquations:
         """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
         return [
             Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
-            for raw in self.equations.values_substituted()
-            for name, x in raw
+            for values in self.equations.values_substituted()
+            for name, x in values
         ]
 
     @property
@@ -234,9 +234,9 @@ class PrintedEquations:
             yield Sentence(f"{STILL.capitalize()}.")
         else:
             yield from self._motion() if self.parts is None else self.parts.items()
-        for by_letter, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
+        for title, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
             if pairs:
-                yield Sentence(by_letter)
+                yield Sentence(title)
                 yield from map(FormulaLine, pairs)
         if self.remark:
             yield Sentence(self.remark)
@@ -518,15 +518,15 @@ class PrintedParts:
     def _matrices(self) -> list[_Matrix]:
         eqs, letters = self.equations, self.printed.letters
         if not self.printed.of_loops:
-            raw: list[tuple[str, Any]] = [(letters.mass, eqs.mass_matrix), (letters.force, eqs.force)]
+            lettered: list[tuple[str, Any]] = [(letters.mass, eqs.mass_matrix), (letters.force, eqs.force)]
         else:
             system = eqs.tree_system
             choices = ("M_t", "A_t"), ("f_t", "b_t"), ("C", "J"), (r"\gamma", "c")
-            raw = [(self._letter(*choice), x) for choice, x in zip(choices, system[:4], strict=True)]
+            lettered = [(self._letter(*choice), x) for choice, x in zip(choices, system[:4], strict=True)]
         meanings = PartMeaning.INERTIA, PartMeaning.FORCE, PartMeaning.CONSTRAINT, PartMeaning.CONSTRAINT_RATE
         return [
             _Matrix(letter, [list(map(self.printed.formula, row)) for row in x.tolist()], meaning, x)
-            for (letter, x), meaning in zip(raw, meanings, strict=False)
+            for (letter, x), meaning in zip(lettered, meanings, strict=False)
         ]
 
     def _place(self, matrix: _Matrix, i: int, j: int) -> Letter:

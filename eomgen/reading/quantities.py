@@ -57,12 +57,12 @@ def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
 
 
 def _of_lagrangian(kinematics: Kinematics) -> dict[str, list[Expr]]:
-    bare, raw = kinematics.mechanism.lagrangian, kinematics.mechanism.given
+    bare, equations = kinematics.mechanism.lagrangian, kinematics.mechanism.given
     assert bare is not None
-    assert raw is not None
+    assert equations is not None
     drag = gradient(bare.dissipation, list(kinematics.v))
     result = {
-        POTENTIAL: _downhill(kinematics, raw.potential_energy),
+        POTENTIAL: _downhill(kinematics, equations.potential_energy),
         FORCES: list(bare.forces),
         DISSIPATION: [-d for d in drag],
     }
@@ -80,14 +80,14 @@ def _downhill(kinematics: Kinematics, potential: Expr) -> list[Expr]:
 def without_forces(kinematics: Kinematics) -> Kinematics:
     """The same motion with no gravity and no force element; of a bare Lagrangian, the equations of L without V."""
     mechanism, graph = kinematics.mechanism, kinematics.graph
-    bare, raw = mechanism.lagrangian, mechanism.given
-    if bare is not None and raw is not None:
+    bare, equations = mechanism.lagrangian, mechanism.given
+    if bare is not None and equations is not None:
         still = tuple(graph.zero for _ in bare.forces)
-        moving = bare.expression + raw.potential_energy
-        raw = differentiate(
+        moving = bare.expression + equations.potential_energy
+        equations = differentiate(
             graph, replace(bare, expression=moving, forces=still, dissipation=graph.zero), kinematics.clock
         )
-    forced = replace(mechanism, gravity=vec.zero(graph), forces=(), given=raw)
+    forced = replace(mechanism, gravity=vec.zero(graph), forces=(), given=equations)
     return replace(kinematics, mechanism=forced, forces=())
 
 
@@ -231,8 +231,8 @@ class Quantities:
     # -- energies ---------------------------------------------------------------------------------------------------
     def _require_energy(self, what: str, keys: tuple[str, ...]) -> None:
         """Refuse energies of given equations of which none of the keys was given."""
-        raw = self.kinematics.mechanism.written
-        if raw is not None and all(getattr(raw, key).is_zero for key in keys):
+        written = self.kinematics.mechanism.written
+        if written is not None and all(getattr(written, key).is_zero for key in keys):
             raise UnavailableError(
                 f"{what} is not known: the equations are given without {keys[0]}; give equations.{keys[0]}"
             )

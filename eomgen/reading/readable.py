@@ -614,19 +614,19 @@ class Readable(ABC):
         """Without what gives quantities as they were formed, which are functions here."""
         return {name: value for name, value in vars(self).items() if name != "_all"}
 
-    def _write(self, name: str, choose: Choose, prefix: str = "", raw: ChooseNames | None = None) -> list[Any]:
+    def _write(self, name: str, choose: Choose, prefix: str = "", choose_names: ChooseNames | None = None) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
-        formed, names = self._form(choose, raw)
+        formed, names = self._form(choose, choose_names)
         prefix = prefix or f"{name.replace('.', '_')}_"
-        written = self.in_sympy(formed, prefix, names, of_motion=raw is not None)
+        written = self.in_sympy(formed, prefix, names, of_motion=choose_names is not None)
         if self._put_in:
             values = [*written.expressions, *(x for _, x in written.intermediates)]
             self._require_finite(name, values, f"with {self._view}")
         self._named[name] = written.intermediates
-        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, raw))
+        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, choose_names))
         return written.expressions
 
     def in_sympy(
@@ -653,11 +653,11 @@ class Readable(ABC):
         named, result = form.sympy(self._symbol, k.parameter_names, prefix, of_motion)
         return Written([(name, with_derivatives(x)) for name, x in named], list(map(with_derivatives, result)))
 
-    def _form(self, choose: Choose, raw: ChooseNames | None) -> tuple[list[Expr], Names]:
+    def _form(self, choose: Choose, choose_names: ChooseNames | None) -> tuple[list[Expr], Names]:
         """Expressions of the quantities with values put in, and what names in them stand for."""
         quantities = Quantities(*self.fresh())
         expressions = list(choose(quantities))
-        names = list(raw(quantities)) if raw is not None else []
+        names = list(choose_names(quantities)) if choose_names is not None else []
         expressions += [x for _, x in names]
         for values in self._put_in:
             expressions = put_in(expressions, values)
@@ -685,7 +685,7 @@ class Readable(ABC):
 
     def numbers_substituted(self) -> dict[str, float | None]:
         """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
-        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for raw in self._put_in for name in raw))
+        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for named in self._put_in for name in named))
         quantities: list[Any] = [*m.parameters, *m.inputs]
         declared = {x.name: x.value for x in quantities if x.value is not None}
         graph = Graph()
@@ -714,10 +714,10 @@ class Readable(ABC):
         """``left_hinge`` of ``left.hinge`` in an instance of a component; any other name as it is."""
         return Undotted(self.kinematics.mechanism.instances).coordinate(name)
 
-    def _read(self, raw: Any, what: str = "symbol") -> dict[str, Any]:
+    def _read(self, named: Any, what: str = "symbol") -> dict[str, Any]:
         """Values that a user puts in for names."""
         allowed = self.kinematics.parameter_names if what == "parameter" else self._known
-        return read_values(raw, allowed, what, self._plain)
+        return read_values(named, allowed, what, self._plain)
 
     def written(self, name: str, part: str | None = None) -> tuple[list[tuple[Any, Any]], Any]:
         """A quantity with its named parts.
@@ -787,12 +787,12 @@ class Readable(ABC):
     def names_substituted(self) -> tuple[str, ...]:
         """Names that the model does not have and that values put in have brought."""
         graph = Graph()
-        values = (read_value(graph, name, value) for raw in self._put_in for name, value in raw.items())
+        values = (read_value(graph, name, value) for named in self._put_in for name, value in named.items())
         return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
 
     def values_substituted(self) -> list[list[tuple[str, Any]]]:
         """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
-        return [[(name, self._as_given(value)) for name, value in raw.items()] for raw in self._put_in]
+        return [[(name, self._as_given(value)) for name, value in named.items()] for named in self._put_in]
 
     def _as_given(self, value: Any) -> Any:
         if isinstance(value, float | int):

@@ -67,23 +67,23 @@ def is_long(quantities: Quantities) -> bool:
         return False
     if count([*_flat(quantities.mass_matrix), *quantities.force]).total > SURELY:
         return True
-    whole, raw = quantities.motion
-    return count([*whole, *(x for _, x in raw)]).total > LONG
+    whole, named = quantities.motion
+    return count([*whole, *(x for _, x in named)]).total > LONG
 
 
 def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
     """The parts; on request with names in them, and at 0 of what they do not depend on, which makes them shorter."""
     flat = [*_flat(quantities.equations.mass_matrix), *(-h for h in quantities.equations.bias)]
     flat += [*_flat(quantities.constraint_jacobian), *quantities.gamma]
-    raw: Named = []
+    named: Named = []
     zeros: tuple[str, ...] = ()
     if short:
         zeros = _zero_rows(quantities, flat)
         graph = quantities.graph
         put = {graph.symbol(name): graph.zero for name in zeros}
         names, values = zip(*_motion_names(quantities), strict=True)
-        flat, raw = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
-    return TreeParts(flat, raw, zeros)
+        flat, named = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
+    return TreeParts(flat, named, zeros)
 
 
 def _flat(rows: Rows) -> list[Expr]:
@@ -149,13 +149,13 @@ def _with_names(flat: Sequence[Expr], motion: Named) -> tuple[list[Expr], Named]
     symbols = {x: graph.symbol(name) for x, name in named.items()}
     result = substitute(flat, symbols)
     used = symbols_of(result)
-    raw: Named = []
+    parts: Named = []
     for value, name in reversed(named.items()):
         if name in used:
             inner = substitute([value], {x: symbol for x, symbol in symbols.items() if x != value})
             used |= symbols_of(inner)
-            raw.append((name, inner[0]))
-    return result, raw[::-1]
+            parts.append((name, inner[0]))
+    return result, parts[::-1]
 
 
 def _is_plain(x: Expr) -> bool:

@@ -141,12 +141,12 @@ def _public(program: Program, minimal: bool) -> list[Traced]:
         collected.append(Traced(kernel.name, arguments, kernel.shape, NAMED[kernel.name].result, function))
     if minimal:
         n = 2 * sizes.n_dof - sizes.n_states
-        raw = {"z": n, "q_guess": sizes.n_q}
+        takes = {"z": n, "q_guess": sizes.n_q}
         if n:
             collected.append(
-                Traced("minimal_rhs", raw, (n,), "z' of z = [q_i; v_i], the degrees of freedom", "minimal")
+                Traced("minimal_rhs", takes, (n,), "z' of z = [q_i; v_i], the degrees of freedom", "minimal")
             )
-        collected.append(Traced("full_state", raw, (sizes.n_x,), "x = [q; v] that belongs to z", "tree_state"))
+        collected.append(Traced("full_state", takes, (sizes.n_x,), "x = [q; v] that belongs to z", "tree_state"))
     return collected
 
 

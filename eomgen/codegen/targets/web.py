@@ -95,10 +95,10 @@ def refuse(program: Program) -> None:
     metadata, remedy = program.metadata, "simulate it, and show the run: traj.animate('run.html')"
     problems = [Problem(f"constraints.{name}", "it closes and opens by impacts, which a page does not compute", remedy,
                         code="EG-UNSUPPORTED") for name in metadata.get("switched", {})]  # fmt: skip
-    raw = {place for _, place in metadata.get("resets", ())}
+    reset_places = {place for _, place in metadata.get("resets", ())}
     problems += [Problem(f"states.{clock['name']}", "it is sampled without a law, by a function in Python", remedy,
                          code="EG-UNSUPPORTED") for clock in metadata.get("clocks", ())
-                 if not raw.intersection(clock.get("states", raw))]  # fmt: skip
+                 if not reset_places.intersection(clock.get("states", reset_places))]  # fmt: skip
     if program.sizes.n_bodies > BODIES:
         problems.append(Problem("bodies", f"{program.sizes.n_bodies} are more than the {BODIES} that a page takes",
                                 remedy, code="EG-UNSUPPORTED"))  # fmt: skip

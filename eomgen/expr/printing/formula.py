@@ -73,8 +73,8 @@ class Order:
             if any(self.of_name(str(s))[0] == RATE for s in base.free_symbols):
                 rates += times if base.is_Symbol else max(times, _degree(base, self._is_rate))
         keys.sort()
-        raw = any(key[0] == INPUT for key in keys)
-        family = 0 if raw else (2, 3, 1)[min(rates, 2)]
+        has_input = any(key[0] == INPUT for key in keys)
+        family = 0 if has_input else (2, 3, 1)[min(rates, 2)]
         heavy = not keys or keys[0][0] > INERTIAL_SUM
         function = bool(keys) and keys[-1][0] >= FUNCTION
         return (family, heavy, function, degree, _flat(keys))

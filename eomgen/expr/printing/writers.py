@@ -419,8 +419,8 @@ def sums_in_lines(formula: tree.Formula, names: Notation) -> list[tree.Formula]:
     """
     space = PAGE - LABEL
     wide = isinstance(formula, tree.Product) and width(formula, names) > space
-    raw = formula.terms if isinstance(formula, tree.Sum) else ((False, formula),) if wide else ()
-    terms = [(subtracted, part) for subtracted, term in raw for part in _in_parts(term, names, space)]
+    summands = formula.terms if isinstance(formula, tree.Sum) else ((False, formula),) if wide else ()
+    terms = [(subtracted, part) for subtracted, term in summands for part in _in_parts(term, names, space)]
     if len(terms) < 2:
         return [formula]
     lines: list[list[tuple[bool, tree.Formula]]] = [[]]

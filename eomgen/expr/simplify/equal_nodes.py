@@ -31,20 +31,20 @@ Given = Sequence[tuple[str, Expr]]
 
 
 def joined_nodes(
-    exprs: Sequence[Expr], raw: Given = (), unit: Sequence[Sequence[str]] = ()
+    exprs: Sequence[Expr], named: Given = (), unit: Sequence[Sequence[str]] = ()
 ) -> tuple[list[Expr], list[tuple[str, Expr]]]:
     """Expressions, and what names in them stand for, with nodes of one function made one node, in a graph of their own.
 
-    ``raw`` are names that stand in the expressions as symbols, and what they stand for, in order; ``unit`` symbols
+    ``named`` are names that stand in the expressions as symbols, and what they stand for, in order; ``unit`` symbols
     whose squares have the sum 1, such as the Euler parameters of a joint.
     """
-    roots = [*(x for _, x in raw), *exprs]
+    roots = [*(x for _, x in named), *exprs]
     if not roots:
         return [], []
     roots, graph = with_known_conditions(roots), roots[0].graph
     opened = Opened(graph, [x.id for x in roots])
     order = reachable(graph, [*opened.roots, *opened.operands])
-    own = [name for name, _ in raw]
+    own = [name for name, _ in named]
     names = sorted(graph.nodes[i][1] for i in order if graph.nodes[i][0] == "sym" and graph.nodes[i][1] not in own)
     result: dict[int, int] = {}
     if names and len(order) * (POINTS + MOVED * len(names)) <= MOST:
@@ -135,7 +135,7 @@ class Values:
     """
 
     def __init__(
-        self, graph: Graph, order: Sequence[int], names: Sequence[str], raw: Given, unit: Sequence[Sequence[str]]
+        self, graph: Graph, order: Sequence[int], names: Sequence[str], named: Given, unit: Sequence[Sequence[str]]
     ) -> None:
         self.graph, self.order, self.names = graph, order, names
         random = np.random.default_rng(5)
@@ -144,7 +144,7 @@ class Values:
             part = random.standard_normal((len(four), POINTS))
             at |= dict(zip(four, part / np.linalg.norm(part, axis=0), strict=True))
         moved = {name: random.uniform(-3.0, 3.0, MOVED) for name in names}
-        values, bounds, same = dependence([Expr(graph, i) for i in order], at, moved, raw)
+        values, bounds, same = dependence([Expr(graph, i) for i in order], at, moved, named)
         self.values, self.bounds = dict(zip(order, values, strict=True)), dict(zip(order, bounds, strict=True))
         self.at = at
         bits = {i: np.flatnonzero(~same[k]).tolist() for k, i in enumerate(order)}

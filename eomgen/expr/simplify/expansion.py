@@ -309,8 +309,8 @@ class Expansion(OfNodes[Poly]):
         waiting = [a]
         while waiting:
             done: Poly = {}
-            for raw, x in waiting.pop().items():
-                monomial = self.atoms.without_squared_signs(raw, "sum")
+            for powers, x in waiting.pop().items():
+                monomial = self.atoms.without_squared_signs(powers, "sum")
                 power = next((f for f in monomial if f[1] >= 1 and self.atoms.table[f[0]].kind == "sum"), None)
                 if power is None:
                     done[monomial] = done.get(monomial, 0) + x

@@ -117,22 +117,22 @@ class Form:
 
 def simplify(
     exprs: Sequence[Expr],
-    raw: Sequence[tuple[str, Expr]] = (),
+    named: Sequence[tuple[str, Expr]] = (),
     rates: Collection[str] = (),
     prefix: str = "z",
     sizes: Sequence[int] = SIZES,
 ) -> Form | None:
     """The shortest form found of expressions; None of no expressions.
 
-    ``raw`` are names that stand in the expressions as symbols, and what they stand for, in order; other names begin
+    ``named`` are names that stand in the expressions as symbols, and what they stand for, in order; other names begin
     with ``prefix``.  ``rates`` names velocities and accelerations: sums of them are read more easily than sums of them
     and other quantities.  Up to so many operations of ``sizes`` what is shared is written out each time, one attempt
     each; ``WHOLE`` writes out all.
     """
-    graph = common_graph([*exprs, *(x for _, x in raw)])
+    graph = common_graph([*exprs, *(x for _, x in named)])
     if graph is None:
         return None
-    roots = [*(x.id for _, x in raw), *(x.id for x in exprs)]
+    roots = [*(x.id for _, x in named), *(x.id for x in exprs)]
     best: Form | None = None
     work = Work(WORK)
     seen: set[tuple[int, ...]] = set()
@@ -143,7 +143,7 @@ def simplify(
         if best is not None and total > WRITTEN:
             break
         seen.add(cuts)
-        form = _Attempt(graph, work, rates).form(exprs, raw, cuts, prefix)
+        form = _Attempt(graph, work, rates).form(exprs, named, cuts, prefix)
         if best is None or form.cost <= best.cost * (1.0 if form.named else SHARED):
             best = form
         if work.left <= LATER or form.cost > WORSE * best.cost:
@@ -210,8 +210,10 @@ class _Attempt:
         for name in sorted(node[1] for node in graph.nodes if node[0] == "sym"):  # so that ties fall alike
             self.expansion.atoms.id("sym", name)
 
-    def form(self, exprs: Sequence[Expr], raw: Sequence[tuple[str, Expr]], cuts: Sequence[int], prefix: str) -> Form:
-        known = {self.graph.symbol(name).id: (x.id, name) for name, x in raw}
+    def form(
+        self, exprs: Sequence[Expr], named_parts: Sequence[tuple[str, Expr]], cuts: Sequence[int], prefix: str
+    ) -> Form:
+        known = {self.graph.symbol(name).id: (x.id, name) for name, x in named_parts}
         taken = {node[1] for node in self.graph.nodes if node[0] == "sym"}
         free = (f"{prefix}{k}" for k in itertools.count() if f"{prefix}{k}" not in taken)
         same: dict[Frozen, Poly] = {}
@@ -230,7 +232,7 @@ class _Attempt:
             self.literal.put(i, alike)
             self.mixed.put(i, Parts({}, alike))
         polys = [self._shortest(x.id) for x in exprs]
-        fixed = {self.expansion.atoms.id("name", name) for name, _ in raw}
+        fixed = {self.expansion.atoms.id("name", name) for name, _ in named_parts}
         self.work.left = max(self.work.left, LATER)
         named, polys = inlined(self.expansion, self.factoring, self.named, polys, fixed)
         return Form(self.graph, self.expansion, self.factoring, named, polys)

@@ -46,12 +46,12 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     rates, applied = joint_rates(kinematics), applied_wrenches(kinematics)
     rest = tuple(graph.zero for _ in kinematics.v)
     own = Resolved.in_link_axes(kinematics.links, kinematics.twists, rates, applied)
-    raw = [link.spatial for link in kinematics.links]
+    spatial = [link.spatial for link in kinematics.links]
     inertias = regroup(graph, kinematics.links)
     inverse = _sweep(kinematics, own, inertias, a)
-    plain = _sweep(kinematics, own, raw, a)
+    plain = _sweep(kinematics, own, spatial, a)
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
-        inertias, inverse = raw, plain
+        inertias, inverse = spatial, plain
     chosen, mass, bias = own, composite_mass_matrix(own.links, inertias), _sweep(kinematics, own, inertias, rest)
     common = resolve_parallel(graph, kinematics.links, kinematics.v, rates, applied)
     if any(axes is not None for axes in common.axes):

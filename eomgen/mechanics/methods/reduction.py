@@ -106,7 +106,7 @@ class LoopNames:
 def eliminate(
     kinematics: Kinematics,
     mobility: Mobility,
-    raw: Sequence[Sequence[Expr]],
+    matrix: Sequence[Sequence[Expr]],
     bound: Sequence[int],
     values: Mapping[str, float],
     names: LoopNames | None = None,
@@ -119,13 +119,13 @@ def eliminate(
     at = dict(values) | dict(zip(kinematics.names, mobility.q_reference, strict=True))
     at |= dict.fromkeys(kinematics.velocity_names, 0.0)
     zero, one = kinematics.graph.zero, kinematics.graph.one
-    others = [k for k in range(len(raw[0])) if k not in bound]
+    others = [k for k in range(len(matrix[0])) if k not in bound]
     solved: dict[int, list[Expr]] = {}
-    for rows, unknowns in _blocks(raw, bound):
-        left = [[raw[i][j] for j in unknowns] for i in rows]
-        right = [[raw[i][k] for k in others] for i in rows]
+    for rows, unknowns in _blocks(matrix, bound):
+        left = [[matrix[i][j] for j in unknowns] for i in rows]
+        right = [[matrix[i][k] for k in others] for i in rows]
         for j, known in solved.items():
-            factors = [raw[i][j] for i in rows]
+            factors = [matrix[i][j] for i in rows]
             right = [
                 [x - f * known[k] for x, k in zip(row, others, strict=True)]
                 for f, row in zip(factors, right, strict=True)
@@ -135,15 +135,15 @@ def eliminate(
             row = dict(zip(others, values_of_row, strict=True))
             if names is not None:
                 row = {k: names.entry(j, k, x) for k, x in row.items()}
-            solved[j] = [row.get(k, one if k == j else zero) for k in range(len(raw[0]))]
+            solved[j] = [row.get(k, one if k == j else zero) for k in range(len(matrix[0]))]
     return solved
 
 
-def _blocks(raw: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple[list[int], list[int]]]:
+def _blocks(matrix: Sequence[Sequence[Expr]], bound: Sequence[int]) -> list[tuple[list[int], list[int]]]:
     """Rows and unknowns of each block, in an order in which each needs only those before it."""
-    blocks = diagonal_blocks([{k: None for k, j in enumerate(bound) if not row[j].is_zero} for row in raw])
+    blocks = diagonal_blocks([{k: None for k, j in enumerate(bound) if not row[j].is_zero} for row in matrix])
     if blocks is None:  # no order exists: a pivot will vanish
-        return [(list(range(len(raw))), list(bound))]
+        return [(list(range(len(matrix))), list(bound))]
     return [(list(block.rows), [bound[k] for k in block.columns]) for block in blocks]
 
 

@@ -210,12 +210,12 @@ GIVEN = "given"  #: what stands where the name of a method would
 
 def direct_equations(kinematics: Kinematics, method: str = GIVEN) -> TreeEquations:
     """The equations of a mechanism that has them; only the lower triangle of M is read."""
-    raw = kinematics.mechanism.given
-    assert raw is not None
+    equations = kinematics.mechanism.given
+    assert equations is not None
     n = len(kinematics.v)
-    lower = raw.mass_matrix
+    lower = equations.mass_matrix
     mass = tuple(tuple(lower[max(i, j)][min(i, j)] for j in range(n)) for i in range(n))
-    bias = tuple(-f for f in raw.forcing)
+    bias = tuple(-f for f in equations.forcing)
     if (bare := kinematics.mechanism.lagrangian) is None:
         moved = [combined(h, row, kinematics.a) for row, h in zip(mass, bias, strict=True)]
     else:  # shorter
@@ -226,6 +226,6 @@ def direct_equations(kinematics: Kinematics, method: str = GIVEN) -> TreeEquatio
         mass_matrix=mass,
         bias=bias,
         inverse_dynamics=tuple(moved),
-        kinetic_energy=raw.kinetic_energy,
-        potential_energy=raw.potential_energy,
+        kinetic_energy=equations.kinetic_energy,
+        potential_energy=equations.potential_energy,
     )
