@@ -410,12 +410,12 @@ class BlockMaker:
                 ports, results = self.contacts.block(name, terms)
                 return block(name, ports, results, self._turned if name == "contact_terms" else ())
             case "dae_tangent":  # dF along (dy, dy')
-                ports = [self.port(port) for port in DAE]
-                y = [symbol for port in ports for symbol in port.symbols]
+                named = [self.port(port) for port in DAE]
+                y = [symbol for port in named for symbol in port.symbols]
                 along = Port("directions", tuple(f"d({symbol})" for symbol in y))
                 seeds = dict(zip(terms.symbols(y), terms.symbols(along.symbols), strict=True))
                 results = jvp(_dae_residual(terms), seeds)
-                return Block(name, (*ports, along), tuple(results), (len(results),), public=False)
+                return Block(name, (*named, along), tuple(results), (len(results),), public=False)
             case "inverse_tangent":  # d(M a + h) along (dq, dv, da)
                 seeds = self._seeds("q", "v", "a")
                 return block(name, "q v a dq dv da", jvp(terms.inverse_dynamics, seeds))

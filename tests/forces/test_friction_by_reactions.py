@@ -481,4 +481,4 @@ def test_verification_holds_laws_against_reactions():
 def test_explained_formulas_agree_with_the_module():
     found = pendulum().derive().explain()
     assert found.difference < 1e-12
-    assert "grows with the force" in found.markdown
+    assert "grows with the reaction" in found.markdown
