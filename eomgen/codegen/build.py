@@ -164,7 +164,7 @@ Known = dict[int, tuple[Any, str]]
 
 
 def fingerprint(program: Program) -> str | None:
-    """SHA-256 of everything a program holds; None where it holds what has no text (Python twins of native code).
+    """SHA-256 of everything a program holds; None where it holds what has no text (Python fallbacks of native code).
 
     Programs of one fingerprint have the same sources, whatever writes them.  The numbers of nodes count too, as they
     decide on orders.

@@ -96,7 +96,7 @@ class _Numbers:
         s = np.linspace(low, high, SAMPLES)
         try:
             rows = evaluate(point, self.declared | {RUNNING[0]: s})
-        except UsageError:  # C code without a twin in Python
+        except UsageError:  # C code without a Python fallback
             return None
         values = [np.broadcast_to(np.asarray(row, dtype=float), s.shape) for row in rows]
         if not np.isfinite(values).all():

@@ -240,7 +240,7 @@ class Function:
     arity: int
     evaluator: (
         Curve | Surface | PythonFallback | None
-    )  #: its values in NumPy; None for native code without a Python twin
+    )  #: its values in NumPy; None for native code without a Python fallback
     native: NativeCode | None = None  #: its C source, if it is no table
     place: tuple[str, int] = ("", 0)  #: file and line where a model file declares it, for messages
     lists = item = False  # as :class:`~eomgen.contact.pairs.PairCall` says of itself
@@ -263,7 +263,7 @@ class Function:
         return lambda *arguments: self.require_evaluator()(*arguments, *orders)
 
     def require_evaluator(self) -> Curve | Surface | PythonFallback:
-        """The evaluator in NumPy; ModelError of native code without a Python twin."""
+        """The evaluator in NumPy; ModelError of native code without a Python fallback."""
         if self.evaluator is None:
             message = "is a C function without a Python version, and must be evaluated in NumPy here"
             remedy = (

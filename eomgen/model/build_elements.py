@@ -276,7 +276,7 @@ def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -
             where = " at the declared values" if symbols_of(laws) - {angle} else ""
             try:
                 requirements.judge(f"constraints.{constraint.name}.{own.name}", TURN, laws, (), [angle], where)
-            except ModelError:  # native code without a twin in Python
+            except ModelError:  # native code without a Python fallback
                 continue
 
 

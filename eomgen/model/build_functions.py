@@ -192,7 +192,7 @@ def _read(reader: Reader, path: str, raw: Any, folder: str) -> tuple[str, str] |
 def _fallback(
     reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]
 ) -> PythonFallback | None:
-    """The Python twin."""
+    """The Python fallback."""
     raw, path = entry.values.get("python"), f"{entry.path}.python"
     if raw is None:
         return None

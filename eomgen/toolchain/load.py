@@ -170,7 +170,7 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     """Open the NumPy functions of a model, kept in the cache like a library: a ``Model`` of ``eomgen._native``.
 
     The sources come from :func:`eomgen.codegen.targets.numpy.emit_numpy`; ``twins`` are what the text calls and does
-    not define, the Python twins of native functions.  No compiler is needed.
+    not define, the Python fallbacks of native functions.  No compiler is needed.
     """
     text = sources[NUMPY]
     key = compute_key({"numpy": text})

@@ -25,7 +25,7 @@ DIRECTIONS = ("dq", "dv", "da", "du", "dp", "directions")
 def define_functions(program: Program) -> tuple[list[str], list[str]]:
     """Imports and definitions of ``call_<function>`` for the NumPy module; the loader puts :func:`twins` into it.
 
-    Raises UsageError (a native function has no Python twin).
+    Raises UsageError (a native function has no Python fallback).
     """
     calls = used_calls(program)
     kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if f.native is None}
@@ -43,7 +43,7 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
 
 
 def twins(program: Program) -> dict[str, PythonFallback]:
-    """Python twins of the native functions a program calls, by the names that the NumPy module uses."""
+    """Python fallbacks of the native functions a program calls, by the names that the NumPy module uses."""
     result = {}
     for f, _ in used_calls(program).values():
         if f.native is not None:
@@ -56,7 +56,7 @@ def twins(program: Program) -> dict[str, PythonFallback]:
 def emit_numpy(program: Program) -> SourceSet:
     """``_core.py``: the functions of a program, its table for the solvers, and the model made of both.
 
-    Raises UsageError (a native function has no Python twin).
+    Raises UsageError (a native function has no Python fallback).
     """
     imports, definitions = define_functions(program)
     text = json.dumps(program.metadata, allow_nan=False)
