@@ -122,8 +122,14 @@ def _walk(belt: np.ndarray, pitch: float, count: int) -> np.ndarray:
     return np.array(places)
 
 
-GROUND = {"stiffness": "k_ground", "dissipation": 0.5, "friction": "mu_ground", "smoothing": "slip"}
-STEEL = {"stiffness": "k_wheels", "dissipation": 0.5, "friction": "mu_wheels", "smoothing": "slip"}
+GROUND = {
+    "law": {"stiffness": "k_ground", "dissipation": 0.5},
+    "friction": {"dynamic": "mu_ground", "smoothing": "slip"},
+}
+STEEL = {
+    "law": {"stiffness": "k_wheels", "dissipation": 0.5},
+    "friction": {"dynamic": "mu_wheels", "smoothing": "slip"},
+}
 
 
 def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: Any = None, soil: str = "") -> Any:
@@ -189,14 +195,14 @@ def undercarriage(m: eg.Model, track: Track, mass: float, inertia: Any, ground: 
         "seat": track.bushing + 0.0005,
         "tip_radius": track.sprocket + track.tip,
     }
-    law: dict[str, Any] = GROUND
+    laws: dict[str, Any] = GROUND
     if soil:  # shoes of 0.6 m, of both tracks
         under = [link.at(track.pitch / 2, -track.shoe, 0) for link in links]
         shoes = {"shape": "plate", "on": under, "length": track.pitch, "width": 1.2}
-        law = {"soil": soil, "contact_width": 0.6, "dissipation": 1.0, "lateral": False}
-    m.contacts("ground", shoes, {"shape": "half_plane", "on": m.ground, **(ground or {})}, law)
-    m.contacts("wheels", rails, wheels, STEEL)
-    m.contacts("mesh", {"shape": "circle", "on": links, "radius": track.bushing}, teeth, STEEL)
+        laws = {"soil": {"type": soil, "contact_width": 0.6, "dissipation": 1.0, "lateral": False}}
+    m.contacts("ground", shoes, {"shape": "half_plane", "on": m.ground, **(ground or {})}, **laws)
+    m.contacts("wheels", rails, wheels, **STEEL)
+    m.contacts("mesh", {"shape": "circle", "on": links, "radius": track.bushing}, teeth, **STEEL)
     m.torque("motor", "sprocket", "max(-relief, min(relief, gain*(speed - sprocket_dot)))")
     m.output("chain_speed", f"sprocket_dot*{track.per_turn / (2.0 * math.pi)!r}", unit="m/s")
     m.output("drive", "power(motor)", unit="W")

@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT))  # of the eomgen beside this file, whichever is in
 
 from eomgen.elements.element_type import ElementType  # noqa: E402
 from eomgen.model.element_methods import ElementMethods, methods  # noqa: E402
-from eomgen.model.methods import RESULTS, arguments_of, documentation_of  # noqa: E402
+from eomgen.model.methods import RESULTS, arguments_of, documentation_of, laws_of  # noqa: E402
 
 HOME = ROOT / "eomgen" / "model" / "element_methods.pyi"
 _HEAD = '''# Written by python tools/stubs.py from the tables of types.
@@ -58,6 +58,7 @@ def _method(section: str, found: ElementType) -> str:
             default = f" = {plain!r}"
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
         listed.append(f"{one.name}: {annotation}{default}")
+    listed += ["**keys: Any"] if laws_of(found) else []
     result = RESULTS[section][0] if section in RESULTS else "None"
     result = "Any" if result.startswith("sympy.") else result
     parts = [f"{part},".replace(" ", "\0") for part in listed]  # no line ends within an argument

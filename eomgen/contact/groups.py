@@ -8,25 +8,32 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
+from ..base.value_rules import POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
-from ..elements.element_type import ElementType, Entry, table
+from ..elements.element_type import ElementType, Entry, law, table
 from ..elements.forces.force import Force, Load, MarkerLoad, MovingView, View
-from ..elements.forces.friction import SUMS, UNIT, DryFriction, LuGre, has_bristles, read_friction
-from ..elements.forces.normal_laws import NORMAL_LAWS, RIGID, HertzBodies, NormalLaw, RigidLaw, read_normal_law
+from ..elements.forces.friction import (
+    BRISTLES,
+    FRICTIONS,
+    SUMS,
+    UNIT,
+    DryFriction,
+    LuGre,
+    friction_key,
+    has_bristles,
+)
+from ..elements.forces.normal_laws import CURVED_LAWS, IMPACT, HertzBodies, NormalLaw, RigidLaw, normal_key
 from ..elements.frames import Frame, Marker
-from ..elements.kinds import Law
 from ..elements.looks import Seen
 from ..expr.core import Expr, Graph
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, MEETINGS, PairLaw, class_of, pair_kind, pair_states
 from .pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
-from .point import CURVED
 from .profiles import never_reached
 from .shapes import PIECED, ContactShape, Feature, by_edges
 from .soil_beds import COUNTS, STATES, bed_rates
-from .soil_laws import LATERAL, SOIL, SoilPressure, SoilShear, read_soil, states_of_soil
+from .soil_laws import LATERAL, SOIL, SoilPressure, SoilShear, states_of_soil
 from .states import (
     BED,
     FIELD,
@@ -359,16 +366,15 @@ def _vector(x: Sequence[Expr]) -> Vec3:
 def _contact_groups(e: Entry) -> ContactGroups | None:
     first = e["first"]
     second = e["second"] if "second" in e.values else ()
-    soil = "soil" in e.values
+    soil, bristles = "soil" in e.values, has_bristles(e.values)
     laws = _laws(e)
-    lateral = e["lateral"]
     if first is None or second is None or laws is None or e.at_fault():
         return None
-    law, friction = laws
+    normal, friction, rigidly = laws
     _refuse_pairs(e, first, second)
-    if not soil and not has_bristles(e.values):  # whose states are counted before shapes are known
+    if not soil and not bristles:  # whose states are counted before shapes are known
         first, second = by_edges(first, second)
-    if has_bristles(e.values):
+    if bristles:
         _refuse_edges(e, first, second)
     if soil:
         _refuse_on_soil(e, first, second)
@@ -378,22 +384,21 @@ def _contact_groups(e: Entry) -> ContactGroups | None:
     for key, shapes in (("first", first), ("second", second)):
         if not soil and any(shape.is_wheel for shape in shapes):
             e.fault(key, "has a circle with a width, which belongs to wheels on soil", "leave width out, or give soil")
-    if isinstance(law, HertzBodies):
+    if isinstance(normal, HertzBodies):
         for key, shapes in (("first", first), ("second", second)):
             if flat := [shape.kind for shape in shapes if shape.kind not in ("sphere", "half_space")]:
                 e.fault(key, f"a {flat[0]} has no radius for Hertz's law from moduli", "give stiffness, not moduli")
-    rigidly = e["friction"] if isinstance(law, RigidLaw) else getattr(friction, "dynamic", None)
     axes = 0
-    if soil or has_bristles(e.values):
+    if soil or bristles:
         groups = groups_of_entry(e.values)
         pairs = pair_states(groups)[1]
-        axes = len(_axes(e.values, groups, lateral)) if pairs else 0
+        axes = len(_axes(e.values, groups)) if pairs else 0
         axes = len(STATES) - 1 if bed else axes
         if pairs > MOST_PAIRS:
             message = f"has {pairs} pairs with states; at most {MOST_PAIRS} may have them"
-            remedy = "put only shapes that stick to each other into the groups, or use friction_law: brown_mcphee"
+            remedy = "put only shapes that stick to each other into the groups, or use friction of type brown_mcphee"
             e.fault("", message, remedy, "EG-TOO-LARGE")
-    return ContactGroups(e.name, first, second, law, friction, e.states(), axes, rigidly, e["restitution"])
+    return ContactGroups(e.name, first, second, normal, friction, e.states(), axes, *rigidly)
 
 
 def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape], soil: bool) -> bool:
@@ -408,36 +413,43 @@ def _is_bed(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactSha
             e.fault(key, "has a bed, which belongs to soil", "give soil, or half_plane or a profile as the ground")
     if beds:
         for word in ("lateral", "peak_angle", "reversal"):
-            e.refuse(word, "has no meaning for a bed, whose cells are sheared along x")
+            _refuse_in_soil(e, word, "has no meaning for a bed, whose cells are sheared along x")
     return bool(beds)
 
 
-def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None] | None:
-    """The law of the normal force and that of friction."""
+def _refuse_in_soil(e: Entry, key: str, why: str) -> None:
+    if key in e.values.get("soil", ()):
+        e.fault(f"soil.{key}", why, "leave it out")
+
+
+def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, Expr | None]] | None:
+    """The laws of the normal force and of friction; coefficient of friction and restitution where bodies are rigid."""
     if "soil" in e.values:
-        return read_soil(e)
-    for key in SOIL:
-        e.refuse(key, "belongs to contacts that have soil")
-    if e["normal_law"] == RIGID:
-        return _rigid_law(e), None
-    if not has_bristles(e.values):
-        e.refuse("lateral", "belongs to contacts that have soil, or friction_law: lugre")
-    return read_normal_law(e), read_friction(e, "friction", "static_friction", "viscous_friction")
-
-
-def _rigid_law(e: Entry) -> RigidLaw:
-    """The law without a stiffness, whose friction and restitution are numbers."""
-    for key in (*CURVED, *LATERAL):
-        if key not in ("normal_law", "friction", "restitution"):
-            e.refuse(key, f"has no meaning in normal_law: {RIGID}, which has friction (a coefficient) and restitution")
-    for key in ("friction", "restitution"):
-        value = e[key]
-        if value is not None:
-            e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
-    restitution = e["restitution"]
-    if restitution is not None:
-        e.require("restitution", restitution, Allowed(high=1.0), "must be at most 1")
-    return RigidLaw()
+        for part in ("law", "friction"):
+            for key in e.values.get(part, ()):
+                e.fault(f"{part}.{key}", "is of another law than soil", "leave it out")
+        result = e.read_part("soil")
+        return None if result is None else (*result, (None, None))
+    if "law" not in e.values:
+        e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has, or soil", "EG-MISSING")
+        return None
+    law, rubbing = e.part("law"), e.values.get("friction", {})
+    if law is None or law.element_type.read is None:
+        return None
+    normal = law.element_type.read(law)
+    restitution = law["restitution"] if "restitution" in law.values else None
+    if law.element_type is not RIGID:
+        friction = e.read_part("friction")
+        return None if normal is None else (normal, friction, (getattr(friction, "dynamic", None), restitution))
+    for key in rubbing:
+        if key != "dynamic":
+            e.fault(
+                f"friction.{key}", "has no meaning for rigid bodies, whose friction is a coefficient", "leave it out"
+            )
+    dynamic = FRICTIONS["coulomb"].keys["dynamic"]
+    place = f"{e.path}.friction.dynamic"
+    coefficient = dynamic.read(e.reader, place, rubbing["dynamic"]) if "dynamic" in rubbing else None
+    return None if normal is None else (normal, None, (coefficient, restitution))
 
 
 def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[ContactShape]) -> None:
@@ -454,21 +466,22 @@ def _refuse_on_soil(e: Entry, first: Sequence[ContactShape], second: Sequence[Co
             on_bed = any(shape.kind == BED for shape in shapes)  # whose cells remember
             if not on_bed:
                 for word in ("recovery", "lateral") if wheels else ("peak_angle", "reversal"):
-                    e.refuse(word, f"has no meaning for {'wheels' if wheels else 'plates'}")
-                e.refuse("settling", "belongs to the cells of a bed")
+                    _refuse_in_soil(e, word, f"has no meaning for {'wheels' if wheels else 'plates'}")
+                _refuse_in_soil(e, "settling", "belongs to the cells of a bed")
             return
     message = "has soil, but no ground"
     e.fault("", message, "give half_plane or a profile as one group, plates or wheels as the other", "EG-MISSING")
 
 
-def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]], lateral: bool) -> tuple[str, ...]:
+def _axes(values: Mapping[str, Any], groups: Sequence[Sequence[ShapeParts]]) -> tuple[str, ...]:
     """How states of friction are called, by their axes.
 
     In the plane along the surface, and across the plane; in space along x and y of half-spaces, or x, y, z of others.
     """
     kinds = {shape.kind for group in groups for shape in group}
     if kinds & set(PLANAR):
-        return ("_x", "_z") if lateral else ("",)
+        law = values["soil" if "soil" in values else "friction"]
+        return ("",) if isinstance(law, Mapping) and law.get("lateral") is False else ("_x", "_z")
     round_pairs = FIELD_SHAPE in kinds or any(first != "surface" for _, _, first, _ in pair_states(groups)[0])
     return ("_x", "_y", "_z") if round_pairs else ("_x", "_y")
 
@@ -481,7 +494,7 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
     groups = groups_of_entry(values)
     if cells := cells_of(groups):
         return {f"{name}_{k + 1}": "m" for k in range(cells) for name in STATES}
-    axes = _axes(values, groups, values.get("lateral", True) is not False)
+    axes = _axes(values, groups)
     names = states_of_soil(axes) if soil else tuple(f"bristle{axis}" for axis in axes)
     unit = "m" if soil else UNIT
     pairs = pair_states(groups)[1]
@@ -533,9 +546,7 @@ def _refuse_edges(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
             kinds = {one.kind, other.kind}
             if one.marker.body != other.marker.body and kinds in ({"cuboid"}, {"cuboid", "capsule"}):
                 message = f"{one.kind} and {other.kind} have no states where their edges meet"
-                e.fault(
-                    "friction_law", message, "use friction_law: coulomb or brown_mcphee for cuboids among themselves"
-                )
+                e.fault("friction.type", message, "use coulomb or brown_mcphee for cuboids among themselves")
                 return
 
 
@@ -568,13 +579,18 @@ _ALLOWED = (
     "half_space, height_field and each other"
 )
 
-_NORMAL_LAW = CURVED["normal_law"].replace(
-    choices=(*NORMAL_LAWS, RIGID),
-    doc=CURVED["normal_law"].doc + f"; {RIGID}, no penetration, for runs by the method moreau only",
+#: No penetration, in runs by the method moreau only.
+RIGID = law(
+    RigidLaw,
+    "rigid",
+    "no penetration, for runs by the method moreau only.",
+    {
+        "restitution": IMPACT["restitution"].replace(
+            doc="coefficient of restitution, Newton's", allowed=Allowed(0.0, 1.0), remedy="is 0 to 1"
+        )
+    },
 )
-_RESTITUTION = CURVED["restitution"].replace(
-    doc="coefficient of restitution, from which the dissipation is computed; in runs by the method moreau Newton's"
-)
+_LUGRE = FRICTIONS[BRISTLES]
 _SHAPES = "shapes {shape, on, ...} of the "
 
 TYPES = table(
@@ -589,12 +605,9 @@ TYPES = table(
                 _SHAPES + "second group; without it those of the first meet among themselves",
                 dimension=LENGTH,
             ),
-            "law": Law("the keys that follow as a mapping, instead of one by one"),
-            **CURVED,
-            "normal_law": _NORMAL_LAW,
-            "restitution": _RESTITUTION,
-            **SOIL,
-            **LATERAL,
+            "law": normal_key(CURVED_LAWS | table(RIGID), required=False),
+            "friction": friction_key(FRICTIONS | table(_LUGRE._replace(keys=_LUGRE.keys | LATERAL))),
+            "soil": SOIL,
         },
         _contact_groups,
         states=_states,

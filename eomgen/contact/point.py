@@ -10,25 +10,15 @@ from ..base.value_rules import NOT_NEGATIVE, POSITIVE
 from ..elements.dimensions import LENGTH
 from ..elements.element_type import ElementType, Entry, table
 from ..elements.forces.force import Force, Load, MarkerLoad, Measured, View
-from ..elements.forces.friction import (
-    FRICTION,
-    FRICTION_CHOICE,
-    UNIT,
-    DryFriction,
-    LuGre,
-    Slip,
-    has_bristles,
-    read_friction,
-)
+from ..elements.forces.friction import FRICTION, UNIT, DryFriction, LuGre, Slip, has_bristles
 from ..elements.forces.normal_laws import (
-    ELASTIC,
+    CURVED_LAWS,
     NORMAL,
-    NORMAL_CHOICE,
     HertzBodies,
     NormalLaw,
     PartlyDamped,
     UpToDepth,
-    read_normal_law,
+    normal_key,
 )
 from ..elements.frames import Marker, velocity_at
 from ..elements.kinds import Fields, Pair, Radii, Scalar
@@ -225,19 +215,17 @@ def joint_radius(first: Expr, second: Expr) -> Expr:
     return first * second / (first + second)
 
 
-def _friction(e: Entry) -> DryFriction | None:
-    return read_friction(e, "friction", "static_friction", "viscous_friction")
-
-
 def _on_plane(e: Entry) -> SpherePlane | None:
-    pair, law, friction = e.pair(), read_normal_law(e), _friction(e)
+    pair, law, friction = e.pair(), e.read_part("law"), e.read_part("friction")
     radius = e.positive("radius") if "radius" in e.fields else e.graph.zero
-    return None if pair is None else SpherePlane(e.name, *pair, law.at(lambda: radius), friction, radius)
+    if pair is None or law is None:
+        return None
+    return SpherePlane(e.name, *pair, law.at(lambda: radius), friction, radius)
 
 
 def _two_spheres(e: Entry) -> SphereSphere | None:
-    pair, law, friction, radii = e.pair(), read_normal_law(e), _friction(e), e["radii"]
-    if pair is None or radii is None:
+    pair, law, friction, radii = e.pair(), e.read_part("law"), e.read_part("friction"), e["radii"]
+    if pair is None or radii is None or law is None:
         return None
     for k, radius in enumerate(radii):
         e.require(f"radii[{k}]", radius, NOT_NEGATIVE, "a radius is 0 or greater")
@@ -247,9 +235,7 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
 
 
 _ENDS = "the plane (z points out of the solid) and the {0}"
-_CONTACT: Fields = {**NORMAL, **FRICTION, **NORMAL_CHOICE, **FRICTION_CHOICE}
-#: Of contacts whose radii are known.
-CURVED: Fields = {**_CONTACT, "stiffness": NORMAL["stiffness"].replace(required=False), **ELASTIC}
+_CURVED: Fields = {"law": normal_key(CURVED_LAWS), "friction": FRICTION}
 
 
 def _states(axes: str) -> Callable[[Mapping[str, Any]], dict[str, str]]:
@@ -261,7 +247,7 @@ TYPES = table(
     ElementType(
         "point_plane",
         "contact of a point (the second marker) with a plane (x-y of the first marker, z out of the solid).",
-        {"between": Pair(_ENDS.format("point"), required=True), **_CONTACT},
+        {"between": Pair(_ENDS.format("point"), required=True), "law": NORMAL, "friction": FRICTION},
         _on_plane,
         states=_states("xy"),
     ),
@@ -271,7 +257,7 @@ TYPES = table(
         {
             "between": Pair(_ENDS.format("sphere's centre"), required=True),
             "radius": Scalar("radius of the sphere (m)", required=True, dimension=LENGTH),
-            **CURVED,
+            **_CURVED,
         },
         _on_plane,
         states=_states("xy"),
@@ -282,7 +268,7 @@ TYPES = table(
         {
             "between": Pair("the centres", required=True),
             "radii": Radii("radii of the spheres (m)", required=True, dimension=LENGTH),
-            **CURVED,
+            **_CURVED,
         },
         _two_spheres,
         states=_states("xyz"),

@@ -9,11 +9,11 @@ from typing import ClassVar, NamedTuple
 
 from ..base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ..elements.dimensions import FORCE, LENGTH, NONE, REACH, SPEED, TIME
-from ..elements.element_type import Entry
+from ..elements.element_type import ElementType, Entry, Law
 from ..elements.forces.force import beyond_zero, where
-from ..elements.forces.friction import FRICTION, FRICTION_CHOICE, DryFriction, Slip
-from ..elements.forces.normal_laws import ELASTIC, NORMAL, NORMAL_CHOICE, NormalLaw
-from ..elements.kinds import Choice, Fields, Flag, Radii, Scalar
+from ..elements.forces.friction import DryFriction, Slip
+from ..elements.forces.normal_laws import DISSIPATION, NormalLaw
+from ..elements.kinds import Fields, Flag, Radii, Scalar
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.records import dataclass
@@ -253,67 +253,60 @@ class SoilShear(DryFriction):
 # -- reading ----------------------------------------------------------------------------------------------------------
 _PRESSURE = FORCE.times(LENGTH, -2)
 _RISE = FORCE.times(REACH, -1)
-SOIL: Fields = {
-    "soil": Choice(
-        "soil under plates and wheels, instead of laws of normal force and friction: the name of a published one, or "
-        f"{OWN} with all numbers given; numbers that are given replace those of a named soil",
-        choices=(OWN, *SOILS),
-    ),
-    "cohesive_modulus": Scalar("k_c (N/m^(n+1)) of the pressure (k_c / b + k_phi) z^n", dimension=_RISE,
-        exponent="sinkage_exponent",
-    ),
-    "frictional_modulus": Scalar("k_phi (N/m^(n+2))", dimension=_RISE.times(REACH, -1), exponent="sinkage_exponent"
-    ),
-    "sinkage_exponent": Scalar("n of the sinkage", dimension=NONE),
-    "cohesion": Scalar("cohesion c (Pa)", dimension=_PRESSURE),
-    "friction_angle": Scalar("angle of internal shearing resistance phi (rad)", dimension=NONE),
-    "shear_modulus": Scalar("K (m): shear displacement in which stress builds up", dimension=LENGTH),
-    "contact_width": Scalar("b (m), the smaller side of the area in contact; the width of the plate unless given",
-        dimension=LENGTH,
-    ),
-    "rebound": Scalar(f"part of the sinkage that unloading gives back; {REBOUND} unless given", dimension=NONE
-    ),
-    "unloading_stiffness": Scalar("k_0 (N/m^3) of the slope k_0 + A_u z_m of unloading, instead of rebound",
-        dimension=_PRESSURE.times(LENGTH, -1),
-    ),
-    "unloading_rise": Scalar("A_u (N/m^4)", dimension=_PRESSURE.times(LENGTH, -2)),
-    "peak_angle": Radii(
-        "c1 and c2 of wheels, whose pressure is greatest at (c1 + c2 abs(slip)) times the angle of entry, such as "
-        "[0.43, 0.32] of compact, [0.18, 0.32] of loose sand (Wong and Reece, 1967); at the lowest point unless given",
-        dimension=NONE,
-    ),
-    "reversal": Scalar("velocity (m/s) of wheels over the ground over which front and rear change places",
-        default=REVERSAL,
-        dimension=SPEED,
-    ),
-    "settling": Scalar(
-        "time constant (s) with which cells of a bed reach the initial sinkage and follow fast sliding",
-        default=SETTLING,
-        dimension=TIME,
-    ),
-    "recovery": Scalar("time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
-        f"{RECOVERY} unless given",
-        dimension=TIME,
-    ),
-}  # fmt: skip
-#: Of contacts with friction that has states.
+#: Of laws with states, of friction and of soil.
 LATERAL: Fields = {
     "lateral": Flag(
         "whether planar shapes have states of lateral sliding; plane mechanisms need none (false)",
         default=True,
     ),
 }
-_OF_OTHERS = (*NORMAL, *NORMAL_CHOICE, *ELASTIC, *FRICTION, *FRICTION_CHOICE)
+_SOIL: Fields = {
+    "cohesive_modulus": Scalar("k_c (N/m^(n+1)) of the pressure (k_c / b + k_phi) z^n", dimension=_RISE,
+        exponent="sinkage_exponent", allowed=NOT_NEGATIVE,
+    ),
+    "frictional_modulus": Scalar("k_phi (N/m^(n+2))", dimension=_RISE.times(REACH, -1), exponent="sinkage_exponent",
+        allowed=NOT_NEGATIVE,
+    ),
+    "sinkage_exponent": Scalar("n of the sinkage", dimension=NONE, allowed=POSITIVE),
+    "cohesion": Scalar("cohesion c (Pa)", dimension=_PRESSURE, allowed=NOT_NEGATIVE),
+    "friction_angle": Scalar("angle of internal shearing resistance phi (rad)", dimension=NONE,
+        allowed=Allowed(0.0, math.pi / 2, below=True), remedy="is 0 or greater and below pi/2; it is in rad",
+    ),
+    "shear_modulus": Scalar("K (m): shear displacement in which stress builds up", dimension=LENGTH, allowed=POSITIVE),
+    "contact_width": Scalar("b (m), the smaller side of the area in contact; the width of the plate unless given",
+        dimension=LENGTH, allowed=POSITIVE,
+    ),
+    "rebound": Scalar(f"part of the sinkage that unloading gives back; {REBOUND} unless given", dimension=NONE,
+        allowed=Allowed(0.0, 1.0, above=True), remedy="is above 0 and at most 1",
+    ),
+    "unloading_stiffness": Scalar("k_0 (N/m^3) of the slope k_0 + A_u z_m of unloading, instead of rebound",
+        dimension=_PRESSURE.times(LENGTH, -1), allowed=NOT_NEGATIVE,
+    ),
+    "unloading_rise": Scalar("A_u (N/m^4)", dimension=_PRESSURE.times(LENGTH, -2), allowed=NOT_NEGATIVE),
+    "peak_angle": Radii(
+        "c1 and c2 of wheels, whose pressure is greatest at (c1 + c2 abs(slip)) times the angle of entry, such as "
+        "[0.43, 0.32] of compact, [0.18, 0.32] of loose sand (Wong and Reece, 1967); at the lowest point unless given",
+        dimension=NONE,
+    ),
+    "reversal": Scalar("velocity (m/s) of wheels over the ground over which front and rear change places",
+        default=REVERSAL, dimension=SPEED, allowed=POSITIVE,
+    ),
+    "settling": Scalar(
+        "time constant (s) with which cells of a bed reach the initial sinkage and follow fast sliding",
+        default=SETTLING, dimension=TIME, allowed=POSITIVE,
+    ),
+    "recovery": Scalar("time (s) in which a plate above the ground forgets sinkage and shear; of published soils "
+        f"{RECOVERY} unless given",
+        dimension=TIME, allowed=POSITIVE,
+    ),
+    "dissipation": DISSIPATION,
+    **LATERAL,
+}  # fmt: skip
 
 
 def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     """The two laws of the keys :data:`SOIL`; None where there are faults, which are noted."""
-    name = e["soil"]
-    for key in _OF_OTHERS:
-        if key != "dissipation":
-            e.refuse(key, "is of another law than soil")
-    if e.at_fault():
-        return None
+    name = str(e.values.get("type"))
     soil = SOILS.get(name)
 
     def number(key: str, published: float | None) -> Expr:
@@ -321,7 +314,7 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
             value: Expr = e[key]
             return value
         if published is None:
-            why = f"is missing of soil: {name}"
+            why = f"is missing of soil {name}"
             where_from = "K is 0.01 m in firm sand, 0.025 m in loose sand, 0.006 m in firm clay (Wong, 2008)"
             remedy = where_from if key == "shear_modulus" else "give it, or the name of a published soil"
             e.fault(key, why, remedy, "EG-MISSING")
@@ -334,25 +327,16 @@ def read_soil(e: Entry) -> tuple[SoilPressure, SoilShear] | None:
     cohesion = number("cohesion", soil and soil.cohesion)
     angle = number("friction_angle", soil and math.radians(soil.angle))
     modulus = number("shear_modulus", soil and soil.shear)
-    for key, value in (("cohesive_modulus", cohesive), ("frictional_modulus", frictional), ("cohesion", cohesion)):
-        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
-    for key, value in (("sinkage_exponent", exponent), ("shear_modulus", modulus)):
-        e.require(key, value, POSITIVE, "must be greater than 0")
-    acute = Allowed(0.0, math.pi / 2, below=True)
-    e.require("friction_angle", angle, acute, "is 0 or greater and below pi/2; it is in rad")
     if "frictional_modulus" in e.values and not e.at_fault():
         message, remedy = "is 0 as cohesive_modulus is", "give one that is greater than 0"
         e.require("frictional_modulus", cohesive + frictional, POSITIVE, remedy, message)
-    width = e.positive("contact_width") if "contact_width" in e.values else None
-    groups = groups_of_entry(e.values)
+    groups = groups_of_entry(e.owner.values)
     rolls = any(shape.kind == WHEEL for group in groups for shape in group) and not cells_of(groups)
     recovery = e.graph.one if rolls else number("recovery", soil and RECOVERY)
-    e.require("recovery", recovery, POSITIVE, "must be greater than 0")
-    dissipation = e["dissipation"]
-    if dissipation is not None:
-        e.require("dissipation", dissipation, NOT_NEGATIVE, "must be 0 or greater")
+    width, dissipation, settling, reversal, _ = (
+        e[key] for key in ("contact_width", "dissipation", "settling", "reversal", "lateral")
+    )
     unloading, peak = _unloading(e), _peak(e)
-    settling, reversal = e.positive("settling"), e.positive("reversal")
     if e.at_fault():
         return None
     damped = e.graph.zero if dissipation is None else dissipation
@@ -366,13 +350,9 @@ def _unloading(e: Entry) -> tuple[Expr | None, tuple[Expr, Expr] | None]:
     """The part of the sinkage that is given back, or two numbers of the slope."""
     keys = ("unloading_stiffness", "unloading_rise")
     if not any(key in e.values for key in keys):
-        part = e["rebound"] if "rebound" in e.values else e.graph.constant(REBOUND)
-        e.require("rebound", part, Allowed(0.0, 1.0, above=True), "is above 0 and at most 1")
-        return part, None
+        return e["rebound"] if "rebound" in e.values else e.graph.constant(REBOUND), None
     e.refuse("rebound", f"follows from {' and '.join(keys)}")
     result = [e[key] if key in e.values else e.graph.zero for key in keys]
-    for key, value in zip(keys, result, strict=True):
-        e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
     return None, (result[0], result[1])
 
 
@@ -391,3 +371,12 @@ def _peak(e: Entry) -> tuple[Expr, Expr] | None:
 def states_of_soil(axes: tuple[str, ...]) -> tuple[str, ...]:
     """What the states of a point are called."""
     return (*(f"shear{axis}" for axis in axes), "sinkage")
+
+
+_ROW = ElementType("soil", "pressure and shear of soil, whose numbers are given or published.", _SOIL, read_soil)
+SOIL = Law(
+    "soil under plates and wheels, instead of laws of normal force and friction: as type the name of a published one, "
+    f"whose numbers may be replaced by others, or {OWN} with all numbers given",
+    dict.fromkeys((OWN, *SOILS), _ROW),
+    flat={"soil": "type"},
+)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ..base.value_rules import Allowed
 from ..expr.core import Expr, Graph
 from .frames import Marker
-from .kinds import Choice, Field, Fields
+from .kinds import Choice, Field, Fields, Schema, table_schema
 
 
 class Found(NamedTuple):
@@ -50,10 +50,12 @@ class Entry:
         self.graph: Graph = reader.graph
         self.stand_in: Expr = reader.stand_in
         self.element_type, self.fields = ElementType("", "", {}), Fields()
+        self.owner: Entry = self  # of a law the entry to which it belongs
+        self.names: Mapping[str, str] = {}  # of keys that stand in the entry by other names
 
     # -- faults ---------------------------------------------------------------------------------------------------
     def _at(self, key: str) -> str:
-        return f"{self.path}.{key}" if key else self.path
+        return f"{self.path}.{self.names.get(key, key)}" if key else self.path
 
     def fault(self, key: str, message: str, remedy: str = "", code: str = "EG-CONFLICT") -> None:
         """Note a fault of one key, or of the entry as a whole (``""``)."""
@@ -108,6 +110,44 @@ class Entry:
         )
         return result
 
+    def part(self, key: str) -> Entry | None:
+        """The law under a key as an entry; None where there is none, or no type of that key, which is noted."""
+        field, values, path = self.fields[key], self.values.get(key), self._at(key)
+        if key not in self.values:
+            return None
+        if not isinstance(values, Mapping):
+            self.reader.wrong(path, values, field)
+            return None
+        assert isinstance(field, Law)
+        preset = "" if "type" in values else field.preset
+        kind = preset or self.reader.type_of(path, values, field.types, key)
+        return self.as_law(field, kind, values, path) if kind else None
+
+    def as_law(
+        self, field: Law, kind: str, values: Mapping[str, Any], path: str, names: Mapping[str, str] | None = None
+    ) -> Entry:
+        """Keys of a law of a type as an entry, in which wrong and missing ones are noted.
+
+        ``names`` are those that its keys have in this entry, where they stand in it themselves.
+        """
+        law = Entry(self.reader, self.name, path, dict(values))
+        law.owner, law.names, law.element_type, law.fields = self, names or {}, field.types[kind], field.keys_of(kind)
+        for key in [key for key in values if key not in law.fields]:
+            types = [name for name, one in field.types.items() if key in one.keys]
+            if types:
+                law.fault(key, f"belongs to {' and '.join(types)}, and this is {kind}", "leave it out")
+            else:
+                self.reader.check_names(path, [key], tuple(law.fields))
+        for key, one in law.fields.items():
+            if one.required and key not in values:
+                law.missing(key, f"give the {(self.fields[names.get(key, key)] if names else one).doc}")
+        return law
+
+    def read_part(self, key: str) -> Any:
+        """The law under a key; None where there is none, or a fault, which is noted."""
+        law = self.part(key)
+        return None if law is None or law.element_type.read is None else law.element_type.read(law)
+
     def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
         """Two markers."""
         result: tuple[Marker, Marker] | None = self[key]
@@ -132,6 +172,8 @@ class Entry:
 
     def states(self) -> tuple[Expr, ...]:
         """The symbols of its own first-order states, in the order in which its type names them."""
+        if self.owner is not self:
+            return self.owner.states()
         return tuple(self.graph.symbol(f"{self.name}_{suffix}") for suffix in self.element_type.states(self.values))
 
     def velocities(self, key: str) -> tuple[tuple[str, Expr, str], ...] | None:
@@ -250,3 +292,104 @@ def element(
 
     more = {"read": read, **({} if where is None else {"one_of": where.one_of}), **more}
     return ElementType(name, doc, own if where is None else {**where.keys, **own, **where.behind}, **more)
+
+
+# -- laws --------------------------------------------------------------------------------------------------------------
+class Law(Field):
+    """A mapping of the type of a law and its keys."""
+
+    argument, annotation = "mapping", "Mapping[str, Any]"
+
+    def __init__(
+        self, doc: str, types: Types, preset: str = "", flat: dict[str, str] | None = None, required: bool = False
+    ) -> None:
+        """``preset`` is the type where none is named; ``flat`` are keys of an entry that stand for others of a law."""
+        super().__init__(doc, required)
+        self.types, self.preset, renamed = types, preset, flat or {}
+        own = {key: key for one in types.values() for key in one.keys if key not in renamed.values()}
+        self.flat = own | renamed
+
+    def keys_of(self, kind: str) -> Fields:
+        """The keys of laws of a type."""
+        word = Choice("type of the law", required=not self.preset, choices=tuple(self.types))
+        return {"type": word, **self.types[kind].keys}
+
+    def type_of(self, value: Any) -> str:
+        """The type of a law as it is written; the first where that is none."""
+        kind = value.get("type") if isinstance(value, Mapping) else None
+        return kind if isinstance(kind, str) and kind in self.types else self.preset or next(iter(self.types))
+
+    def rows(self) -> list[tuple[list[str], ElementType]]:
+        """The types, those of the same keys and physics as one, with their names."""
+        every = [([name for name, other in self.types.items() if other is one], one) for one in self.types.values()]
+        return [row for k, row in enumerate(every) if row not in every[:k]]
+
+    def json(self) -> Schema:
+        schemas = []
+        for names, one in self.rows():
+            word = Choice("type of the law", required=self.preset not in names, choices=tuple(names))
+            schemas.append(table_schema({"type": word, **one.keys}))
+        return {"oneOf": schemas, "description": self.doc}
+
+    def map(self, value: Any, visitor: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        keys = self.keys_of(self.type_of(value))
+        return {key: keys[key].map(x, visitor) if key in keys else x for key, x in value.items()}
+
+
+def law(
+    kind: type,
+    name: str,
+    doc: str,
+    more: Fields | None = None,
+    check: Callable[[Entry, dict[str, Any]], None] | None = None,
+) -> ElementType:
+    """The type of laws whose fields are read from their keys; ``more`` are keys beside these.
+
+    ``check`` notes what is wrong with several together, and puts in place of fields what follows from others.
+    """
+    own = keys_of(kind)
+
+    def read(e: Entry) -> Any:
+        values = {key: e[key] for key in own}
+        if check is not None:
+            check(e, values)
+        return None if e.at_fault() else kind(**values)
+
+    return ElementType(name, doc, own | (more or {}), read)
+
+
+def sort_laws(
+    keys: Fields, values: Mapping[str, Any], twice: Callable[[str], None]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Values of an entry with each key of a law in the mapping of that law, and where these were written otherwise.
+
+    Keys of all laws may stand in the entry one by one, or in the mapping ``law``; ``twice`` notes those given twice.
+    """
+    laws = {key: field for key, field in keys.items() if isinstance(field, Law)}
+    rest, parts, places = dict[str, Any](), {key: dict[str, Any]() for key in laws}, dict[str, str]()
+    single: list[tuple[str, str, Any]] = []
+    for key, value in values.items():
+        if key == "law" and key in laws and isinstance(value, Mapping) and value:
+            single += [("law.", one, x) for one, x in value.items()]
+        elif key in laws and isinstance(value, Mapping) and value:
+            parts[key] = dict(value)
+        elif any(key in field.flat for field in laws.values()):
+            single.append(("", key, value))
+        else:
+            rest[key] = value
+    present = {key for _, key, _ in single} | {key for key, part in parts.items() if part}
+    for before, key, value in single:
+        homes = [home for home, field in laws.items() if key in field.flat] or ["law"]
+        home = next((one for one in homes[1:] if one in present), homes[0])
+        name = laws[home].flat.get(key, key)
+        if home in rest or name in parts[home]:
+            twice(before + key)
+            continue
+        parts[home][name] = value
+        for one, nested in laws[home].flat.items() if home != "law" or not before else ():
+            places.setdefault(f"{home}.{nested}", before + one)
+        places[f"{home}.{name}"] = before + key
+    result = rest | {key: part for key, part in parts.items() if part}
+    return result, {nested: one for nested, one in places.items() if nested != one}

@@ -27,7 +27,6 @@ LAW = 2  #: positions and velocities of markers, and outputs that need no accele
 OUTPUT = 3  #: accelerations and energies
 
 EXPONENT = 1.5  #: of the penetration in the law of a contact (Hertz), unless given
-LINEAR = "linear"  #: the choice of normal_law whose exponent is 1
 
 Schema = dict[str, Any]
 _RULES = {POSITIVE: "must be greater than 0", NOT_NEGATIVE: "must be 0 or greater"}
@@ -85,7 +84,6 @@ def define(name: str, schema: Schema | Callable[[], Schema]) -> tuple[Schema, di
 _TEXT: Schema = {"type": "string"}
 _FLAG: Schema = {"type": "boolean"}
 _WHOLE: Schema = {"type": "integer", "minimum": 1}
-_OBJECT: Schema = {"type": "object"}
 _NUMBER: Schema = {"type": ["number", "string"]}
 
 
@@ -194,7 +192,7 @@ class Field:
         """
         result = None if self.dimension is None else self.dimension.along(length)
         if result is not None and self.exponent and length:
-            power = 1.0 if values.get("normal_law") == LINEAR else values.get(self.exponent, EXPONENT)
+            power = values.get(self.exponent, EXPONENT)
             return None if isinstance(power, str) or not hasattr(power, "__float__") else result.times(LENGTH, -power)
         return result
 
@@ -604,13 +602,6 @@ class Inertia(Wheels):
 
     def is_default(self, value: Any) -> bool:
         return super().is_default(value) or is_zero(value)
-
-
-class Law(Field):
-    """A mapping of keys of the law to numbers or expressions."""
-
-    argument, annotation = "mapping", "Mapping[str, Any]"
-    schema = _OBJECT
 
 
 # -- axes, frames and markers -----------------------------------------------------------------------------------------

@@ -560,7 +560,7 @@ class _Writer:
             "velocity": speed if 0.0 < speed < math.inf else span,
             "formula": "flores",
         }
-        self._force("stop", joint, "stop", {**bounds, **law})
+        self._force("stop", joint, "stop", {**bounds, "law": law})
 
     def _rotor(self, joint: RobotJoint) -> None:
         """The armature of a ball joint: inertia without mass that turns in space as the child does on its parent."""

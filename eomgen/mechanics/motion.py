@@ -442,7 +442,7 @@ class MarkerMotion:
     def _exerted(self, mechanism: Mechanism, force: Force, quantity: WrenchQuantity) -> Expr:
         result = part_exerted(self, force, quantity)
         if force.is_rigid:
-            message = f"the contacts {force.name!r} have normal_law: rigid, which exerts impulses, not forces"
+            message = f"the contacts {force.name!r} have the law rigid, which exerts impulses, not forces"
             remedy = (
                 "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
                 "or give a normal law with a stiffness"

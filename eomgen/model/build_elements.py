@@ -15,7 +15,7 @@ from ..elements.constraints.switching import SWITCHING
 from ..elements.element_type import ElementType, Entry, Types
 from ..elements.forces import FORCES
 from ..elements.joints import JOINTS, Joint
-from ..elements.kinds import LIMITS, Law, Scalar
+from ..elements.kinds import LIMITS, Scalar
 from ..errors import ModelError
 from ..expr.core import symbols_of
 from ..expr.records import dataclass
@@ -298,12 +298,6 @@ def element_states(
     return tuple(states), rates
 
 
-def _keys_of_law(element: ElementType) -> set[str]:
-    """The keys of a type that belong to its law: those that follow the key ``law``, and that key."""
-    keys = list(element.keys)
-    return set(keys[keys.index("law") :])
-
-
 def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
     """The type, if the entry has one and says in one way what it acts on; its keys are checked."""
     if e.at_fault():
@@ -315,9 +309,6 @@ def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
     if _misunderstood(e, result):
         return None
     e.element_type, e.fields = result, result.fields(what, types)
-    if isinstance(result.keys.get("law"), Law) and not e.values.keys() & _keys_of_law(result):
-        e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has", "EG-MISSING")
-        return None
     check_keys(e.path, e.values, e.fields, e.reader.faults)
     present = [key for key in result.one_of if key in e.values]
     if result.one_of and len(present) != 1:

@@ -179,6 +179,7 @@ def build(description: Description) -> Mechanism:
         constraints=constraints,
         switched=switched,
         lines=dict(description.lines),
+        written_paths=dict(description.written_paths),
         doc=doc,
         latex=dict(reader.latex),
         instances=dict(description.instances),
@@ -271,7 +272,7 @@ def _check_path_quantities(reader: Reader, forces: tuple[Force, ...]) -> None:
     for requested, path in reader.requested.items():
         quantity, name, on = requested.name, requested.of, requested.on
         if name in known and known[name].is_rigid and not on:
-            fault = f"the contacts {name!r} have normal_law: rigid, which exerts impulses, not forces"
+            fault = f"the contacts {name!r} have the law rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
             reader.fault(path, fault, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED")
         elif quantity != "power" and not on and name in known and not known[name].acts_along:

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from ..base.names import place_of_marker
 from ..base.operations import OPERATIONS
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
+from ..elements.element_type import Law
 from ..elements.kinds import Field
 from ..expr.core import Expr, Graph, reachable
 from .description import DescribedEntry, Description
@@ -69,9 +70,10 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         section, entry, steps = _place(reader.description, path)
         field, values = _field(section, entry, steps)
 
-        def length(row: Field, section: str = section, entry: Any = entry, values: Any = values) -> bool:
+        def length(row: Field, section: str = section, entry: Any = entry) -> bool:
             if section == "joints":
                 return kinds.get(entry.name) == "length"
+            values = {} if entry is None else entry.values
             return acts_on_length(section, values, row, lambda name: kinds.get(name) == "length")
 
         for word, row in field.local.items() if field is not None and local else ():
@@ -171,13 +173,16 @@ def _steps(path: str) -> list[Any]:
 
 
 def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tuple[Field | None, Mapping[str, Any]]:
-    """The row of the field in which an expression stands, and the entry's values."""
+    """The row of the field in which an expression stands, and the values of the entry, or of the law in it."""
     if entry is None:
         own = {"lagrangian": LAGRANGIAN, "equations": EQUATIONS}.get(section)
         key = steps[0] if own is None else steps[1] if len(steps) > 1 else ""
         return (MODEL if own is None else own).get(key.partition("[")[0]), {}
-    row = fields_of(section, entry.values).get(steps[0])
-    return None if row is None else row.part([step for step in steps[1:] if isinstance(step, str)]), entry.values
+    row, values = fields_of(section, entry.values).get(steps[0]), entry.values
+    if isinstance(row, Law) and len(steps) > 1:
+        values = values[steps[0]]
+        row, steps = row.keys_of(row.type_of(values)).get(steps[1]), steps[1:]
+    return None if row is None else row.part([step for step in steps[1:] if isinstance(step, str)]), values
 
 
 def _plain_mass(entry: DescribedEntry | None) -> float:

@@ -442,6 +442,8 @@ def _copy_origins(target: Description, component: Component, instance: Instance,
             target.lines.setdefault(origins[head] + rest, place_in_file)
             if rest and key in inner.origins:
                 target.origins[origins[head] + rest] = inner.origins[key]
+    for key, written in inner.written_paths.items():
+        target.written_paths[origins[_split(key)[0]] + _split(key)[1]] = origins[_split(key)[0]] + _split(written)[1]
     for name, prefix in inner.instances.items():
         target.instances[f"{instance.prefix}{name}"] = instance.prefix + prefix
 

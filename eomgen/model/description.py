@@ -8,12 +8,13 @@ SymPy expressions as the user gave them.  Nothing is looked up or judged here; t
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from ..base.texts import html_text
-from ..elements.kinds import Table
+from ..elements.element_type import sort_laws
+from ..elements.kinds import Fields, Table
 from ..elements.kinds import is_zero as is_zero
 from ..elements.kinds import items as items
 from ..errors import Problem, cannot
@@ -66,6 +67,7 @@ class Description:
     #: Label of an unnamed marker whose motion is used -> its reference (a mapping of body, at, rpy).
     motions: dict[str, Values] = field(default_factory=dict)
     lines: dict[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line)
+    written_paths: dict[str, str] = field(default_factory=dict)  #: dotted path -> as the user wrote it, if otherwise
     problems: list[Problem] = field(default_factory=list)  #: faults of what the description was made from
     notes: list[str] = field(default_factory=list)  #: what an import left out or changed
     #: Section -> name in an imported file, or in SymPy -> name in the model, where they differ.
@@ -75,9 +77,26 @@ class Description:
     origins: dict[str, Origin] = field(default_factory=dict)
     incomplete: bool = False  #: whether components or instances have faults, so that names are missing
 
-    def add(self, section: str, name: Any, values: Values) -> DescribedEntry:
-        """Append an entry to a section."""
-        entry = DescribedEntry(name, values, f"{section}.{shortened(name)}")
+    def add(
+        self,
+        section: str,
+        name: Any,
+        values: Values,
+        keys: Fields | None = None,
+        home: str = "",
+        twice: Callable[[str], None] = lambda path: None,
+    ) -> DescribedEntry:
+        """Append an entry to a section; of ``keys`` those of laws are put into their laws.
+
+        ``home`` is the section in which the user wrote it, if another; ``twice`` takes the path of a key given twice.
+        """
+        path = f"{section}.{shortened(name)}"
+        if home:
+            self.written_paths[path] = f"{home}.{shortened(name)}"
+        own = as_written(path, self.written_paths)
+        values, places = sort_laws(keys or {}, values, lambda key: twice(f"{own}.{key}"))
+        self.written_paths.update((f"{path}.{key}", f"{own}.{place}") for key, place in places.items())
+        entry = DescribedEntry(name, values, path)
         self.sections[section].append(entry)
         return entry
 
@@ -97,7 +116,17 @@ class Description:
 
     def place(self, path: str) -> tuple[str, int]:
         """File and line of a dotted path; ``("", 0)`` if the model comes from no file."""
-        return place_of(path, self.lines)
+        return place_of(as_written(path, self.written_paths), self.lines)
+
+
+def as_written(path: str, written: Mapping[str, str]) -> str:
+    """A dotted path as the user wrote it."""
+    start = path
+    while written and start:
+        if start in written:
+            return written[start] + path[len(start) :]
+        start = parent_of(start)
+    return path
 
 
 def place_of(path: str, lines: Mapping[str, tuple[str, int]]) -> tuple[str, int]:
@@ -124,7 +153,7 @@ class Faults:
     """Collects the problems of one description, with the file and line of each."""
 
     def __init__(self, description: Description) -> None:
-        self.lines, self.origins = description.lines, description.origins
+        self.lines, self.origins, self.written_paths = description.lines, description.origins, description.written_paths
         self.problems: list[Problem] = []
         self._seen: set[Problem] = set()
         self._paths: set[str] = set()
@@ -133,7 +162,9 @@ class Faults:
 
     def add(self, path: str, message: str, remedy: str = "", code: str = "") -> None:
         """Note a fault at a dotted path."""
-        self.take(Problem(path, message, remedy, *place_of(path, self.lines), code))
+        own = as_written(path, self.written_paths)
+        self.take(Problem(own, message, remedy, *place_of(own, self.lines), code))
+        self._mark(path)
 
     def mapping(self, path: str, value: Any, remedy: str) -> Mapping[Any, Any]:
         """A value, if it is a mapping, else an empty one; noted unless it is None."""
@@ -151,7 +182,9 @@ class Faults:
             return
         self._seen.add(problem)
         self.problems.append(problem)
-        path = problem.path
+        self._mark(problem.path)
+
+    def _mark(self, path: str) -> None:
         while path and path not in self._paths:
             self._paths.add(path)
             path = parent_of(path)

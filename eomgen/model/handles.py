@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..base import texts
 from ..elements.joints import JOINTS
+from ..elements.kinds import Fields
 from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..expr.records import dataclass
 from ..expr.texts import shown
@@ -30,9 +31,15 @@ class Described:
         """The description of the model, with the same structure as a model file."""
         return self._description
 
-    def _add(self, section: str, name: str, values: dict[str, Any]) -> DescribedEntry:
-        """Append an entry to a section, with the file and line of the call."""
-        entry = self._description.add(section, require_name(section, name), values)
+    def _add(
+        self, section: str, name: str, values: dict[str, Any], keys: Fields | None = None, home: str = ""
+    ) -> DescribedEntry:
+        """Append an entry to a section, with the file and line of the call; see :meth:`Description.add`."""
+
+        def twice(path: str) -> None:
+            raise at_odds(f"{path} is given in a law and beside it; give it once")
+
+        entry = self._description.add(section, require_name(section, name), values, keys, home, twice)
         self._description.lines[entry.path] = calling_line()
         return entry
 

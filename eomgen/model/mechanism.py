@@ -23,7 +23,7 @@ from ..errors import ModelError, Problem
 from ..expr.core import LEAVES, Expr, Graph, reachable
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
-from .description import place_of
+from .description import as_written, place_of
 from .placement import TURNS, Columns
 from .quantities import Quantity, ReactionQuantity, WrenchQuantity
 from .requirements import Requirement
@@ -275,6 +275,7 @@ class Mechanism:
     constraints: tuple[Constraint, ...] = ()
     switched: tuple[Switched, ...] = ()  #: constraints that close and open, which are not among those
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
+    written_paths: Mapping[str, str] = field(default_factory=dict)  #: dotted path -> as the user wrote it, for messages
     doc: str = ""
     latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given
     instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix, for display
@@ -305,6 +306,7 @@ class Mechanism:
 
     def problem(self, path: str, message: str, remedy: str = "", code: str = "") -> Problem:
         """A problem at a dotted path, with the file and line the path or its nearest parent came from."""
+        path = as_written(path, self.written_paths)
         return Problem(path, message, remedy, *place_of(path, self.lines), code)
 
     def missing_values(self) -> list[Problem]:
@@ -335,8 +337,9 @@ class Mechanism:
 #: Attributes that nothing is computed from.
 ASIDE = frozenset(
     (
-        *("doc", "docs", "latex", "instances", "lines", "notes", "place", "graph", "functions", "file", "requirements"),
-        *("named_markers", "body_shapes", "added_bodies", "limits_told", "default_gravity", "of_velocities"),
+        *("doc", "docs", "latex", "instances", "lines", "written_paths", "notes", "place", "graph", "functions"),
+        *("file", "requirements", "named_markers", "body_shapes", "added_bodies", "limits_told", "default_gravity"),
+        *("of_velocities",),
     )
 )
 #: What counts of a key of a joint's own, and how its kind is spelled: digests are compared over versions.

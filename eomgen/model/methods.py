@@ -8,16 +8,17 @@ from __future__ import annotations
 import functools
 import inspect
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from inspect import Parameter, Signature
 from typing import Any, NamedTuple, TypeVar, cast
 
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
-from ..elements.element_type import ElementType
+from ..elements.element_type import ElementType, Law
 from ..elements.joints import JOINTS
-from ..elements.kinds import Field, Law, Rates, Text, items
-from ..errors import UsageError, at_odds, ill_typed, no_such
+from ..elements.kinds import Field, Rates, Text, items
+from ..errors import UsageError, ill_typed, no_such
 from .description import DescribedEntry
+from .fields import MODEL
 from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, JointHandle, MarkerHandle, References
 from .names import nearest
 from .sympy_face import function, symbol
@@ -64,7 +65,9 @@ def _arguments(element: ElementType, key: str, field: Field, later: bool) -> lis
     ):  # which is no default of the method: given, it may contradict the rest
         doc = f"{doc} Default: {str(field.default).lower()}."
     anywhere = {"joint", "between"} <= {*element.one_of}
-    if field.required and (anywhere or not later):  # what follows *between is given by its keyword
+    if (
+        field.required and not isinstance(field, Law) and (anywhere or not later)
+    ):  # what follows *between is given by its keyword
         default = Parameter.empty
     if {"joint", "body"} <= {*element.one_of} and key in ("joint", "body"):
         on = "A joint or coordinate if value is one number, a body or marker if it is three."
@@ -96,7 +99,14 @@ def signature_of(element: ElementType) -> Signature:
             way = Parameter.KEYWORD_ONLY
         else:
             made.append(Parameter(one.name, way, default=one.default, annotation=one.annotation))
+    if laws_of(element):
+        made.append(Parameter("keys", Parameter.VAR_KEYWORD, annotation="Any"))
     return Signature(made)
+
+
+def laws_of(element: ElementType) -> list[Law]:
+    """The keys of laws of a type."""
+    return [field for field in element.keys.values() if isinstance(field, Law)]
 
 
 def documentation_of(section: str, element: ElementType) -> str:
@@ -118,15 +128,33 @@ def documentation_of(section: str, element: ElementType) -> str:
         needed = element.keys[one.key].required or one.name in ("on", "*between")
         lines.append(f"{names} : {one.kind}{'' if needed else ', optional'}")
         lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
+        field = element.keys[one.key]
+        lines += _law_lines(field) if isinstance(field, Law) else []
+    if laws_of(element):
+        lines += ["**keys", "    Keys of laws one by one, as in earlier versions: ``friction=0.3, smoothing=1e-3``."]
     return "\n".join(lines + (["", "Returns", "-------", RESULTS[section][0]] if section in RESULTS else []))
+
+
+def _law_lines(law: Law) -> list[str]:
+    """The types of a law and their keys, each explained once."""
+    lines, known = list[str](), set[str]()
+    for names, one in law.rows():
+        keys = [f"``{key}``" + f", {field.doc}" * (key not in known) for key, field in one.keys.items()]
+        known |= one.keys.keys()
+        text = f"- {', '.join(f'``{name}``' for name in names)}: {one.doc}  Keys: {'; '.join(keys)}."
+        lines += ["", *textwrap.wrap(text, _WIDTH, initial_indent="    ", subsequent_indent="      ")]
+    return [*lines, ""]
 
 
 def method_of(section: str, element: ElementType) -> Callable[..., Any]:
     """The method that adds an entry to a section of a description, an element of a type."""
     signature, every = signature_of(element), arguments_of(element)
-    allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
+    several = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    allowed = [p.name for p in signature.parameters.values() if p.kind not in several][1:]
     required = [one.name for one in every if one.default is Parameter.empty]
     anywhere = any(one.name == "*between" for one in every)
+    laws = laws_of(element)
+    allowed += [key for law in laws for key in law.flat]
 
     def add(self: Described, /, *args: Any, **keys: Any) -> Any:
         check_keywords(element.name, keys, allowed)
@@ -144,10 +172,11 @@ def method_of(section: str, element: ElementType) -> Callable[..., Any]:
             bound.apply_defaults()
         raw = {key: value for key, value in bound.arguments.items() if value is not None or key in element.ends}
         name, raw = bound.arguments["name"], {key: x for key, x in raw.items() if key not in ("self", "name")}
+        single = raw.pop("keys", {}) if laws else {}
         values = _entry(self, element, name, raw) if section in _HANDLES else _said(self, element, raw)
         if section in (*_HANDLES, "functions"):
-            values = {"type": element.name, **values}
-        entry = self._add(section, name, values)
+            values = {"type": element.name, **values, **{key: x for key, x in single.items() if x is not None}}
+        entry = self._add(section, name, values, element.keys, element.name if element.name in MODEL else "")
         return RESULTS[section][1](self, entry) if section in RESULTS else None
 
     add.__name__, add.__qualname__, add.__module__ = element.name, f"Model.{element.name}", "eomgen.api.model"
@@ -197,9 +226,6 @@ def _entry(model: Described, element: ElementType, name: Any, raw: dict[str, Any
         entry[key] = element.keys[key].reference([raw.pop(first), raw.pop(second)], refer)
     elif {"joint", "between"} <= {*element.one_of}:
         entry |= _where(refer, raw.pop("between", ()), raw.pop("joint", None))
-    law = raw.pop("law", None) if isinstance(element.keys.get("law"), Law) else None
-    if law is not None:
-        raw = {**raw, **_law(element, name, law, raw)}
     for key, field in element.keys.items():
         if key in raw and not _is_default(raw[key], field):
             if isinstance(raw[key], JointHandle) and key in element.remedies:
@@ -207,19 +233,6 @@ def _entry(model: Described, element: ElementType, name: Any, raw: dict[str, Any
                 raise ill_typed(f"{element.name} {name!r} acts at a marker, and {message}")
             entry[key] = field.reference(raw[key], refer)
     return {key: value for key, value in entry.items() if value is not None}
-
-
-def _law(element: ElementType, name: Any, law: Any, raw: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys of a law that is given as a mapping."""
-    if not isinstance(law, Mapping):
-        raise ill_typed(f"{element.name} {name!r}: law is {type(law).__name__}, not a mapping of its keys")
-    check_keywords(
-        f"the law of {element.name}", dict(law), [key for key in element.keys if not isinstance(element.keys[key], Law)]
-    )
-    twice = sorted(law.keys() & raw.keys())
-    if twice:
-        raise at_odds(f"{element.name} {name!r}: {twice[0]} is given in law and beside it; give it once")
-    return law
 
 
 def _is_default(value: Any, field: Field) -> bool:

@@ -15,6 +15,7 @@ from ..base.algebra import Array
 from ..base.value_rules import LIMITS, NOT_NEGATIVE, NOT_ZERO, POINTS, POSITIVE, RANGE, RULES, Allowed
 from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate
+from .description import as_written
 
 
 class Requirement(NamedTuple):
@@ -67,7 +68,11 @@ class Requirements:
         """Keep a rule for late values, where any of the numbers depends on parameters, and on nothing else."""
         names = symbols_of(expressions) - {*local}
         if names and names <= self.parameters:
-            self.all.append(Requirement(path, rule, tuple(expressions), tuple(data), tuple(local)))
+            self.all.append(
+                Requirement(
+                    as_written(path, self.faults.written_paths), rule, tuple(expressions), tuple(data), tuple(local)
+                )
+            )
 
     def known(self, expressions: Sequence[Expr], points: Mapping[str, Array] | None = None) -> Array | None:
         """Numbers, a row each, at the declared values and at points of local names; None if these do not tell."""

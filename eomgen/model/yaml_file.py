@@ -291,38 +291,23 @@ def _open_part(name: str, file: str, origin: _Origin, faults: Faults) -> Descrip
 
 
 def _add_contacts(description: Description, faults: Faults, value: Any, origin: _Origin) -> None:
-    """Take in the section ``contacts``: forces of that type, whose law may be a mapping of its own."""
-    for path, place in list(description.lines.items()):
-        if path.startswith("contacts."):
-            description.lines["forces" + path.removeprefix("contacts")] = place
+    """Take in the section ``contacts``: forces of that type."""
     forces: dict[str, Any] = {}
     for name, raw in faults.mapping("contacts", value, "write the names of the contacts as keys").items():
         if isinstance(raw, Mapping) and "type" in raw:
-            faults.add(f"forces.{name}.type", "is given in the section contacts", "leave it out", "EG-CONFLICT")
+            faults.add(f"contacts.{name}.type", "is given in the section contacts", "leave it out", "EG-CONFLICT")
         forces[name] = {"type": "contacts", **raw} if isinstance(raw, Mapping) else raw
-    _add_section(description, faults, "", "forces", forces, origin)
-
-
-def _spread_law(description: Description, faults: Faults, path: str, values: dict[str, Any]) -> dict[str, Any]:
-    """The keys of contacts with those of their law beside them."""
-    law = values.get("law")
-    if values.get("type") != "contacts" or "law" not in values:
-        return values
-    if not isinstance(law, Mapping):
-        faults.add(f"{path}.law", f"is not {kinds.Law.says}", "give stiffness and what else the law has", "EG-TYPE")
-        return values
-    for key in law:
-        if key in values:
-            faults.add(f"{path}.{key}", "is given in law and beside it", "give it once", "EG-CONFLICT")
-        if f"{path}.law.{key}" in description.lines:
-            description.lines[f"{path}.{key}"] = description.lines[f"{path}.law.{key}"]
-    return {key: x for key, x in values.items() if key != "law"} | dict(law)
+    _add_section(description, faults, "", "forces", forces, origin, "contacts")
 
 
 def _add_section(
-    description: Description, faults: Faults, start: str, section: str, value: Any, origin: _Origin
+    description: Description, faults: Faults, start: str, section: str, value: Any, origin: _Origin, home: str = ""
 ) -> None:
-    """Take in the entries of a section; an empty section is one that was left out."""
+    """Take in the entries of a section, ``home`` in the file; an empty section is one that was left out."""
+
+    def twice(path: str) -> None:
+        faults.add(f"{start}{path}", "is given in a law and beside it", "give it once", "EG-CONFLICT")
+
     named = faults.mapping(f"{start}{section}", value, f"write the names of the {section} as keys")
     for name, raw in named.items():
         values, place = raw, f"{section}.{name}"
@@ -336,12 +321,13 @@ def _add_section(
                 values = {key: raw}
             else:
                 faults.add(
-                    f"{start}{place}", f"is not {kinds.Table.says}", "write its keys as {key: value, ...}", "EG-TYPE"
+                    f"{start}{home or section}.{name}",
+                    f"is not {kinds.Table.says}",
+                    "write its keys as {key: value, ...}",
+                    "EG-TYPE",
                 )
                 values = {}
-        if section == "forces":
-            values = _spread_law(description, faults, place, values)
-        entry = description.add(section, name, values)
+        entry = description.add(section, name, values, fields_of(section, values), home, twice)
         entry.trusted, entry.folder = section == "functions" and origin.trusted, origin.folder
 
 

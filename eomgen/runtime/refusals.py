@@ -56,9 +56,9 @@ KINDS = {
     "rigid": Kind(
         "rigid contacts, which exert impulses alone",
         lambda layout: [repr(name) for name in layout.info.rigid_only],
-        "{call} is not available for models with rigid contacts, and contacts {names} of {model!r} have normal_law: "
+        "{call} is not available for models with rigid contacts, and contacts {names} of {model!r} have the law "
         "rigid, which exerts impulses, not forces: shapes would pass through each other; run by simulate with "
-        "method='moreau' and step=, or choose another normal_law",
+        "method='moreau' and step=, or choose another law",
     ),
     "baumgarte": Kind(
         "constraints stabilised by baumgarte=",

@@ -386,11 +386,11 @@ def test_energy_over_waves(kind: str) -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({}, "EG-MISSING forces.floor.second[0].x"),
-        ({"height": "u"}, "EG-NAME-UNKNOWN forces.floor.second[0].height u"),
-        ({"height": "x*j0_x"}, "EG-REFERENCE forces.floor.second[0].height j0_x"),
-        ({"x": [0, 1], "y": [1, 0], "z": [[0, 0], [0, 0]]}, "EG-RANGE forces.floor.second[0].y[1]"),
-        ({"x": [0, 1], "y": [0, 1], "z": [[0, 0]]}, "EG-SHAPE forces.floor.second[0].z 1 2"),
+        ({}, "EG-MISSING contacts.floor.second[0].x"),
+        ({"height": "u"}, "EG-NAME-UNKNOWN contacts.floor.second[0].height u"),
+        ({"height": "x*j0_x"}, "EG-REFERENCE contacts.floor.second[0].height j0_x"),
+        ({"x": [0, 1], "y": [1, 0], "z": [[0, 0], [0, 0]]}, "EG-RANGE contacts.floor.second[0].y[1]"),
+        ({"x": [0, 1], "y": [0, 1], "z": [[0, 0]]}, "EG-SHAPE contacts.floor.second[0].z 1 2"),
     ],
 )
 def test_what_is_wrong_with_a_field_is_reported(given: dict[str, Any], told: str) -> None:

@@ -336,8 +336,8 @@ def test_depth_on_a_half_space(kind: str) -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({"shape": "ellipsoid", "semi_axes": (1, 2, -1)}, "EG-RANGE forces.floor.first[0].semi_axes[2] -1"),
-        ({"shape": "cuboid", "size": (1, 0, 1)}, "EG-RANGE forces.floor.first[0].size[1]"),
+        ({"shape": "ellipsoid", "semi_axes": (1, 2, -1)}, "EG-RANGE contacts.floor.first[0].semi_axes[2] -1"),
+        ({"shape": "cuboid", "size": (1, 0, 1)}, "EG-RANGE contacts.floor.first[0].size[1]"),
     ],
 )
 def test_what_is_wrong_with_a_shape_is_reported(given: dict[str, Any], told: str) -> None:
@@ -478,4 +478,4 @@ def test_bristles_between_edges_are_refused() -> None:
     m, (a, b) = flying(2)
     law = {"stiffness": 1e4, "friction": 0.5, "friction_law": "lugre", "bristle_stiffness": 1e3, "bristle_damping": 1.0}
     m.contacts("touch", {**BLOCKS[0], "on": a}, {**BLOCKS[1], "on": b}, law)
-    refuses("EG-CONFLICT forces.touch.friction_law", m.derive)
+    refuses("EG-CONFLICT contacts.touch.law.friction_law", m.derive)

@@ -188,11 +188,11 @@ def test_lateral_belongs_to_states() -> None:
     ground = {"shape": "half_plane", "on": m.ground}
     law = {"stiffness": 1e5, "lateral": False}
     m.contacts("touch", {"shape": "circle", "on": a, "radius": 0.1}, ground, law)
-    refuses("EG-CONFLICT forces.touch.lateral: soil lugre", m.derive)
+    refuses("EG-CONFLICT contacts.touch.law.lateral: lugre", m.derive)
 
 
 def test_too_many_pairs_with_states_are_refused() -> None:
     m, (a, b) = scenes.planar("crowd", 2)
     groups = [{"shape": "circle", "on": [body.at(k, 0, 0) for k in range(45)], "radius": 0.1} for body in (a, b)]
     m.contacts("touch", *groups, LUGRE)
-    refuses("EG-TOO-LARGE forces.touch 2025 2000", m.derive)
+    refuses("EG-TOO-LARGE contacts.touch 2025 2000", m.derive)

@@ -206,7 +206,7 @@ def test_segments_without_a_radius_are_refused_where_corners_would_pass() -> Non
     thin = {"shape": "segment", "length": 0.3}
     for shape in (thin, {"shape": "box", "size": (0.1, 0.1)}):
         m.contacts("c", on(thin, bodies[0]), on(shape, bodies[1]), LAW)
-        refuses("EG-RANGE forces.c.first 0", m.derive)
+        refuses("EG-RANGE contacts.c.first 0", m.derive)
         m, bodies = scenes.planar("thin", 2)
     m.contacts("c", {"on": bodies[0], **thin}, {"on": bodies[1], "shape": "circle", "radius": 0.1}, LAW)
     m.derive()
@@ -215,8 +215,8 @@ def test_segments_without_a_radius_are_refused_where_corners_would_pass() -> Non
 @pytest.mark.parametrize(
     ("first", "told"),
     [
-        (3, "EG-TYPE forces.c.first"),
-        ([{"shape": "circle", "radius": 0.1}] * 2, "EG-CONFLICT forces.c.first b0"),
+        (3, "EG-TYPE contacts.c.first"),
+        ([{"shape": "circle", "radius": 0.1}] * 2, "EG-CONFLICT contacts.c.first b0"),
         ({"shape": "polygon", "points": [("m", 0), (0, 0.1), (-0.1, 0)]}, "EG-DIMENSION first[0].points[0][0]"),
     ],
 )

@@ -427,7 +427,7 @@ def test_faults_of_laws_are_reported_together() -> None:
         "f2.smoothing": "is missing", "f3.smoothing": "is -0.1", "f4.stribeck": "is missing",
         "s1": "has no limit", "s2.stiffness": "is -1", "s2.upper": "this is upper - lower", "s2.exponent": "is 0.5",
         "c1.velocity": "give restitution and velocity together", "c2.restitution": "is 1.5",
-        "c3.formula": "dissipation is given too", "c4.smoothing": "is given without friction",
+        "c3.formula": "dissipation is given too", "c4.friction": "is missing",
         "c5.radius": "is 0", "c6.radii": "two numbers", "b1.stiffness": "six numbers",
         "b2.stiffness[1][0]": "not symmetric", "g1.center": "lies on 'b' itself", "g2.body": "no body 'c'",
         "m1.activation": "is 2", "m1.fiber_length": "is 0",

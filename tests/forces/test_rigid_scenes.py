@@ -96,9 +96,9 @@ def test_order_and_split_of_groups_change_nothing() -> None:
 def test_a_shape_in_both_groups_and_groups_without_shapes_are_refused() -> None:
     """So that no pair is counted twice."""
     for first, second, told in (
-        (2, 2, "EG-CONFLICT forces.c.second"),
-        (0, 2, "EG-MISSING forces.c"),
-        (2, 0, "EG-MISSING forces.c"),
+        (2, 2, "EG-CONFLICT contacts.c.second"),
+        (0, 2, "EG-MISSING contacts.c"),
+        (2, 0, "EG-MISSING contacts.c"),
     ):
         m, bodies = free_bodies(np.array([1.0, 2.0]))
         both = [{**ROUND, "on": body} for body in bodies]

@@ -326,13 +326,14 @@ def test_momentum_targets_jacobian_and_rebound_parameters() -> None:
 @pytest.mark.parametrize(
     ("shape", "bed", "law", "told"),
     [
-        (WHEEL, {"cells": 0}, {"soil": "dry_sand"}, "EG-RANGE forces.soil.second[0].cells: 0"),
-        (WHEEL, {}, {"soil": "dry_sand", "lateral": False}, "EG-CONFLICT forces.soil.lateral:"),
-        (WHEEL, {}, {"soil": "dry_sand", "peak_angle": [0.4, 0.3]}, "EG-CONFLICT forces.soil.peak_angle:"),
-        ({"shape": "circle", "radius": 0.5}, {}, {"stiffness": 1e5}, "EG-CONFLICT forces.soil.second:"),
-        ({"shape": "box", "size": (1, 1)}, {}, {"soil": "dry_sand"}, "EG-CONFLICT forces.soil.first: box"),
+        (WHEEL, {"cells": 0}, {"soil": "dry_sand"}, "EG-RANGE contacts.soil.second[0].cells: 0"),
+        (WHEEL, {}, {"soil": "dry_sand", "lateral": False}, "EG-CONFLICT contacts.soil.law.lateral:"),
+        (WHEEL, {}, {"soil": "dry_sand", "peak_angle": [0.4, 0.3]}, "EG-CONFLICT contacts.soil.law.peak_angle:"),
+        ({"shape": "circle", "radius": 0.5}, {}, {"stiffness": 1e5}, "EG-CONFLICT contacts.soil.second:"),
+        ({"shape": "box", "size": (1, 1)}, {}, {"soil": "dry_sand"}, "EG-CONFLICT contacts.soil.first: box"),
         (WHEEL, {}, {"soil": "own", "sinkage_exponent": 1, "cohesive_modulus": 1e3, "frictional_modulus": 1e6,
-                     "cohesion": 0, "friction_angle": 0.5, "shear_modulus": 0.01}, "EG-MISSING forces.soil.recovery:"),
+                     "cohesion": 0, "friction_angle": 0.5, "shear_modulus": 0.01},
+         "EG-MISSING contacts.soil.law.recovery:"),
     ],
 )  # fmt: skip
 def test_what_is_refused(shape: Any, bed: Any, law: Any, told: str) -> None:

@@ -181,18 +181,28 @@ CIRCLES, BOXES, FLOOR, LAST = (
 )
 POINTS = "first: [{{shape: polygon, on: [a, b], points: {}}}]"
 FAULTS = [
-    ("friction: mu", "friction: -0.1", "EG-RANGE forces.floor.friction heap.yaml 14 -0.1 0"),
-    (CIRCLES, CIRCLES.replace("circle", "circel"), "EG-CHOICE forces.floor.first[0].shape circel 'circle'?"),
-    (CIRCLES, "first: []", "EG-MISSING forces.floor.first"),
-    (CIRCLES, CIRCLES.replace("b]", "c]"), "EG-NAME-UNKNOWN forces.floor.first[0].on[1] c b"),
-    (LAST, "law: 3", "EG-TYPE forces.among.law"),
-    (LAST, "", "EG-MISSING forces.among"),
-    (LAST, "law: {stiffness: 1, stifness: 1}", "EG-NAME-UNKNOWN forces.among.stifness"),
-    (FLOOR, "{shape: half_space, on: ground}", "EG-CONFLICT forces.floor.second half_space"),
-    (FLOOR, "{shape: circle, on: a, radius: r}", "EG-CONFLICT forces.floor.second a"),
-    (BOXES, BOXES.replace("[a, b]", "a"), "EG-CONFLICT forces.among"),
-    (BOXES, POINTS.format("[[0, 0], [1, 0], [0.2, 0.2], [0, 1]]"), "EG-RANGE forces.among.first[0].points"),
-    (BOXES, POINTS.format("[[0, 0], [1, 0], [2, 0], [0, 1]]"), "EG-RANGE forces.among.first[0].points[1]"),
+    ("friction: mu", "friction: -0.1", "EG-RANGE contacts.floor.law.friction heap.yaml 14 -0.1 0"),
+    (CIRCLES, CIRCLES.replace("circle", "circel"), "EG-CHOICE contacts.floor.first[0].shape circel 'circle'?"),
+    (CIRCLES, "first: []", "EG-MISSING contacts.floor.first"),
+    (CIRCLES, CIRCLES.replace("b]", "c]"), "EG-NAME-UNKNOWN contacts.floor.first[0].on[1] c b"),
+    (LAST, "law: 3", "EG-TYPE contacts.among.law"),
+    (LAST, "", "EG-MISSING contacts.among"),
+    (LAST, "law: {stiffness: 1, stifness: 1}", "EG-NAME-UNKNOWN contacts.among.law.stifness"),
+    (FLOOR, "{shape: half_space, on: ground}", "EG-CONFLICT contacts.floor.second half_space"),
+    (FLOOR, "{shape: circle, on: a, radius: r}", "EG-CONFLICT contacts.floor.second a"),
+    (LAST, "law: {law: {stiffness: 1}}", "EG-NAME-UNKNOWN contacts.among.law.law stiffness heap.yaml 17"),
+    (LAST, "law: {type: lineer, stiffness: 1}", "EG-CHOICE contacts.among.law.type lineer 'linear'?"),
+    (LAST, "law: {stiffness: 1, damping: 1}", "EG-CONFLICT contacts.among.law.damping linear hunt_crossley"),
+    (LAST, "law: {stiffness: 1}\n    stiffness: 2", "EG-CONFLICT contacts.among.stiffness"),
+    (LAST, LAST + "\n    friction: {dynamic: -1, smoothing: 1}", "EG-RANGE contacts.among.friction.dynamic 18 -1"),
+    (LAST, LAST + "\n    friction: {dynamic: 1}", "EG-MISSING contacts.among.friction.smoothing 18"),
+    (LAST, LAST + "\n    friction: 0.2", "EG-MISSING contacts.among.smoothing"),
+    (LAST, LAST + "\n    soil: {type: dry_sand}", "EG-CONFLICT contacts.among.law.stiffness soil"),
+    (LAST, "soil: {type: dry_sent}", "EG-CHOICE contacts.among.soil.type 'dry_sand'?"),
+    (LAST, "law: {stiffness: r}", "EG-DIMENSION contacts.among.law.stiffness"),
+    (BOXES, BOXES.replace("[a, b]", "a"), "EG-CONFLICT contacts.among"),
+    (BOXES, POINTS.format("[[0, 0], [1, 0], [0.2, 0.2], [0, 1]]"), "EG-RANGE contacts.among.first[0].points"),
+    (BOXES, POINTS.format("[[0, 0], [1, 0], [2, 0], [0, 1]]"), "EG-RANGE contacts.among.first[0].points[1]"),
 ]
 
 
@@ -200,3 +210,40 @@ FAULTS = [
 def test_faults_of_files(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in FILE
     refuses(message, lambda: load(tmp_path, FILE.replace(old, new), "heap.yaml").check())
+
+
+TOGETHER = "law: {stiffness: 1e5, dissipation: 0.3, friction: mu, smoothing: 0.001}"
+WRITINGS = (
+    "law: {type: hunt_crossley, stiffness: 1e5, dissipation: 0.3}\n    friction: {dynamic: mu, smoothing: 0.001}",
+    "stiffness: 1e5\n    dissipation: 0.3\n    friction: mu\n    smoothing: 0.001",
+    "law: {stiffness: 1e5, dissipation: 0.3}\n    friction: mu\n    friction_law: coulomb\n    smoothing: 0.001",
+)
+
+
+@pytest.mark.parametrize("writing", WRITINGS)
+def test_all_writings_of_a_law_are_one_model(tmp_path: Path, writing: str) -> None:
+    models = [load(tmp_path, FILE), load(tmp_path, FILE.replace(TOGETHER, writing))]
+    models += [load(tmp_path, model.to_yaml()) for model in models]
+    digests = [m.compile(target="numpy", kernels=["poses"]).metadata["model_digest"] for m in models]
+    assert len({*digests}) == 1
+
+
+@pytest.mark.parametrize(
+    ("writing", "place"),
+    [("law: {stiffness: -1}", "law.stiffness 8"), ("friction: -1\n        law: {stiffness: 1}", "friction 8 -1")],
+)
+def test_a_law_of_a_component_is_reported_where_it_is_written(tmp_path: Path, writing: str, place: str) -> None:
+    text = f"""\
+name: two
+components:
+  leg:
+    bodies: {{foot: {{mass: 1}}}}
+    joints: {{j: {{type: prismatic, between: [ground, foot]}}}}
+    forces:
+      sole:
+        {writing}
+        type: point_plane
+        between: [ground, foot]
+add: {{left: {{component: leg}}, right: {{component: leg}}}}
+"""
+    refuses(f"EG-RANGE components.leg.forces.sole.{place} left right", load(tmp_path, text).check)

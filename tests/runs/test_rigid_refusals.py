@@ -47,7 +47,7 @@ def test_deep_start(ball: Any) -> None:
 
 @pytest.mark.parametrize("method", [None, "Radau"])
 def test_other_methods_have_no_force_for_it(ball: Any, method: str | None) -> None:
-    refuses("EG-UNSUPPORTED normal_law", ball.simulate, 0.2, {"j_y": 0.2}, method=method)
+    refuses("EG-UNSUPPORTED rigid moreau", ball.simulate, 0.2, {"j_y": 0.2}, method=method)
 
 
 def test_residual_that_is_not_reached() -> None:

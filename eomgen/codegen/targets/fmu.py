@@ -57,9 +57,9 @@ def refuse_impacts(program: Program, holder: str = "an FMU") -> None:
     ]
     problems += [
         Problem(
-            f"contacts.{name}.normal_law",
+            f"contacts.{name}.law.type",
             f"rigid contacts exert impulses, which {holder} cannot hold",
-            "choose another normal_law",
+            "choose another law",
             code="EG-UNSUPPORTED",
         )
         for name in program.metadata.get("rigid_only", ())
@@ -426,7 +426,7 @@ def write_fmu(
     ------
     ModelError
         A parameter has no value, or the model has impacts: events with ``restitution``, or contacts with
-        ``normal_law: rigid``.
+        law ``rigid``.
     UsageError
         An unknown version, or a file name that does not end in ``.fmu``.
     ToolchainError

@@ -15,7 +15,7 @@ from ...expr.core import Expr, Graph, sqrt
 from ...expr.records import dataclass
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
-from ..element_type import ElementType, Entry, table
+from ..element_type import ElementType, Entry, Law, Types, key, law, table
 from ..kinds import LAW, Choice, Fields, Scalar
 from .force import Force, View, beyond_zero, map_law, where
 from .paths import ON_JOINT, Path, PathForce, read_coordinate
@@ -104,6 +104,24 @@ def stribeck_level(squared: Expr, dynamic: Expr, static: Expr | None, stribeck: 
     return dynamic + (static - dynamic) * fall
 
 
+_DYNAMIC = Scalar("coefficient of sliding friction", required=True, level=LAW, dimension=NONE, allowed=NOT_NEGATIVE)
+_STATIC = Scalar(
+    "coefficient of static friction, at the onset of sliding; give stribeck too", level=LAW, dimension=NONE
+)
+_STRIBECK = Scalar(
+    "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to sliding friction",
+    dimension=RATE,
+    allowed=POSITIVE,
+)
+_VISCOUS = Scalar(
+    "viscous friction coefficient per normal force and velocity (s/m)",
+    default=0,
+    level=LAW,
+    dimension=NONE.times(RATE, -1),
+    allowed=NOT_NEGATIVE,
+)
+
+
 # -- bristles ----------------------------------------------------------------------------------------------------------
 
 
@@ -146,13 +164,19 @@ class LuGre(LineFriction):
     joint_formula: ClassVar[str] = (
         r"F = -(\sigma_0 z + \sigma_1 \dot{z} + b v), \quad \dot{z} = v - \sigma_0 \frac{|v|}{c(v)} z"
     )
-    dynamic: Expr
-    stiffness: Expr
-    damping: Expr
-    viscous: Expr
-    static: Expr | None
-    stribeck: Expr | None
-    deflections: tuple[Expr, ...]  #: states: z of a joint, e of a contact
+    dynamic: Expr = key(_DYNAMIC.replace(allowed=POSITIVE))
+    stiffness: Expr = key(
+        Scalar(
+            "friction per deflection of the bristles", required=True, dimension=NONE.times(REACH, -1), allowed=POSITIVE
+        )
+    )
+    damping: Expr = key(
+        Scalar("friction per rate of the deflection", required=True, dimension=NONE.times(RATE, -1), allowed=POSITIVE)
+    )
+    viscous: Expr = key(_VISCOUS)
+    static: Expr | None = key(_STATIC)
+    stribeck: Expr | None = key(_STRIBECK)
+    deflections: tuple[Expr, ...] = ()  #: states: z of a joint, e of a contact
     lateral: Vec3 | None = None
 
     def along(self, rate: Expr) -> Expr:
@@ -250,11 +274,6 @@ def _size(x: Vec3) -> Expr:
 # -- laws --------------------------------------------------------------------------------------------------------------
 
 
-BRISTLES = "lugre"  #: the law that has states
-#: Laws of dry friction.
-FRICTION_LAWS = ("coulomb", "brown_mcphee", BRISTLES)
-
-
 class SlidingFriction(LineFriction):
     """Friction that follows from the sliding velocity alone."""
 
@@ -280,11 +299,15 @@ class Friction(SlidingFriction):
 
     formula: ClassVar[str] = r"F_t = -F_n (\frac{c(v)}{\sqrt{v^2 + v_s^2}} + b) v"
     joint_formula: ClassVar[str] = r"F = -c(v) \mathrm{tanh}(v/v_s) - b v"
-    dynamic: Expr
-    smoothing: Expr
-    viscous: Expr
-    static: Expr | None = None
-    stribeck: Expr | None = None
+    dynamic: Expr = key(_DYNAMIC)
+    smoothing: Expr = key(
+        Scalar(
+            "sliding velocity (m/s) below which friction is smoothed", required=True, dimension=RATE, allowed=POSITIVE
+        )
+    )
+    viscous: Expr = key(_VISCOUS)
+    static: Expr | None = key(_STATIC)
+    stribeck: Expr | None = key(_STRIBECK)
 
     def level(self, squared: Expr) -> Expr:
         """c of the squared sliding velocity."""
@@ -315,10 +338,12 @@ class BrownMcPhee(SlidingFriction):
     )
     formula: ClassVar[str] = rf"F_t = -F_n ({_CURVE})"
     joint_formula: ClassVar[str] = rf"F = -({_CURVE})"
-    dynamic: Expr
-    static: Expr
-    transition: Expr
-    viscous: Expr
+    dynamic: Expr = key(_DYNAMIC)
+    static: Expr = key(_STATIC.replace(doc="coefficient of static friction, the greatest; that of sliding by default"))
+    transition: Expr = key(
+        Scalar("velocity (m/s) near which friction is largest", required=True, dimension=RATE, allowed=POSITIVE)
+    )
+    viscous: Expr = key(_VISCOUS)
 
     def along(self, rate: Expr) -> Expr:
         x = rate / self.transition
@@ -342,119 +367,56 @@ class BrownMcPhee(SlidingFriction):
 
 def has_bristles(values: Mapping[str, Any]) -> bool:
     """Whether an entry's law of friction has states."""
-    law = values.get("friction_law")
-    return isinstance(law, str) and law == BRISTLES
+    law = values.get("friction")
+    kind = law.get("type") if isinstance(law, Mapping) else values.get("friction_law")
+    return isinstance(kind, str) and kind == BRISTLES
 
 
-#: Of contacts, as parts of the normal force.
-FRICTION: Fields = {
-    "friction": Scalar("coefficient of sliding friction", level=LAW, dimension=NONE),
-    "static_friction": Scalar(
-        "coefficient of static friction, at the onset of sliding; give stribeck too", level=LAW, dimension=NONE
-    ),
-    "stribeck": Scalar(
-        "Stribeck velocity (m/s): the sliding velocity at which static friction has largely dropped to "
-        "sliding friction",
-        dimension=RATE,
-    ),
-    "viscous_friction": Scalar(
-        "viscous friction coefficient per normal force and velocity (s/m)",
-        default=0,
-        level=LAW,
-        dimension=NONE.times(RATE, -1),
-    ),
-    "smoothing": Scalar("sliding velocity (m/s) below which friction is smoothed", dimension=RATE),
-}
-#: Which law it is, and what only some laws have; of a contact.
-FRICTION_CHOICE: Fields = {
-    "friction_law": Choice(
-        "law of friction: coulomb, the default, smoothed and with the Stribeck effect if wanted; brown_mcphee; lugre, "
-        "bristles that hold a body at rest",
-        default=FRICTION_LAWS[0],
-        choices=FRICTION_LAWS,
-    ),
-    "transition": Scalar("velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE),
-    "bristle_stiffness": Scalar(
-        "friction of friction_law lugre per deflection of the bristles", dimension=NONE.times(REACH, -1)
-    ),
-    "bristle_damping": Scalar(
-        "friction of friction_law lugre per rate of the deflection", dimension=NONE.times(RATE, -1)
-    ),
-}
-_PLAIN = ("stribeck", "smoothing", "transition", "bristle_stiffness", "bristle_damping")
+def _check_onset(e: Entry, values: dict[str, Any]) -> None:
+    """Static friction with the Stribeck velocity, or neither."""
+    if ("static" in e.values) != ("stribeck" in e.values):
+        missing = "stribeck" if "static" in e.values else "static"
+        e.missing(missing, "give static friction and stribeck together, or neither")
+    _check_static(e, values)
 
 
-def read_friction(e: Entry, dynamic: str, static: str, viscous: str, only: bool = False) -> LineFriction | None:
-    """Dry friction from the keys of its parts; None without Coulomb's part, beside which viscous may stand alone."""
-    if dynamic not in e.values:
-        for key in (static, "friction_law", *_PLAIN, *(() if only else (viscous,))):
-            if key in e.values:
-                e.fault(key, f"is given without {dynamic}", f"give {dynamic}, or leave {key} out", "EG-MISSING")
-        return None
-    level = e[dynamic]
-    kind = e["friction_law"]
-    if kind == BRISTLES:
-        e.require(dynamic, level, POSITIVE, "must be greater than 0 in friction_law: lugre")
-    else:
-        e.require(dynamic, level, NOT_NEGATIVE, "must be 0 or greater")
-    along = e[viscous]
-    if along is not None and not only:
-        e.require(viscous, along, NOT_NEGATIVE, "must be 0 or greater")
-    drag = e.graph.zero if along is None else along
-    if kind == "brown_mcphee":
-        return _brown_mcphee(e, level, drag, static)
-    if kind == BRISTLES:
-        return _lugre(e, level, drag, static)
-    for key in _PLAIN[2:]:
-        e.refuse(key, f"has no meaning in friction_law: {kind}")
-    if "smoothing" not in e.values:
-        e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
-        return None
-    pair = _onset(e, level, static)
-    return None if pair is None else Friction(level, e.positive("smoothing"), drag, *pair)
+def _check_static(e: Entry, values: dict[str, Any]) -> None:
+    """Static friction is not below sliding friction."""
+    if values["static"] is not None:
+        phrases = "is {1:g}, below sliding friction {0:g}", "static is the greater"
+        e.judge("static", LIMITS, [values["dynamic"], values["static"]], phrases)
 
 
-def _onset(e: Entry, level: Expr, static: str) -> tuple[Expr | None, Expr | None] | None:
-    """Static friction and Stribeck velocity, or neither; None where only one is given, which is noted."""
-    if (static in e.values) != ("stribeck" in e.values):
-        missing = "stribeck" if static in e.values else static
-        e.missing(missing, f"give {static} and stribeck together, or neither")
-        return None
-    onset = e[static]
-    if onset is not None:
-        _require_greater(e, level, onset, static)
-    return onset, e.positive("stribeck") if "stribeck" in e.values else None
+def _check_greatest(e: Entry, values: dict[str, Any]) -> None:
+    if values["static"] is None:
+        values["static"] = values["dynamic"]
+    _check_static(e, values)
 
 
-def _require_greater(e: Entry, level: Expr, onset: Expr, static: str) -> None:
-    """Require static friction that is not below sliding friction, which is itself not below 0."""
-    phrases = "is {1:g}, below sliding friction {0:g}", "static is the greater"
-    e.judge(static, LIMITS, [level, onset], phrases)
+def _check_bristles(e: Entry, values: dict[str, Any]) -> None:
+    _check_onset(e, values)
+    values["deflections"] = e.states()
+    if "lateral" in e.fields:
+        e["lateral"]
 
 
-def _brown_mcphee(e: Entry, level: Expr, viscous: Expr, static: str) -> BrownMcPhee | None:
-    for key in ("stribeck", "smoothing", *_PLAIN[3:]):
-        e.refuse(key, "has no meaning in friction_law: brown_mcphee, which has transition")
-    if "transition" not in e.values:
-        e.missing("transition", "give the velocity (greater than 0) near which friction is largest")
-        return None
-    onset = e[static]
-    if onset is None:
-        onset = level
-    _require_greater(e, level, onset, static)
-    return BrownMcPhee(level, onset, e.positive("transition"), viscous)
+BRISTLES = "lugre"  #: the type that has states
+#: Laws of dry friction, as parts of the normal force.
+FRICTIONS = table(
+    law(Friction, "coulomb", "smoothed, with the Stribeck effect if wanted.", check=_check_onset),
+    law(BrownMcPhee, "brown_mcphee", "of continuous derivatives.", check=_check_greatest),
+    law(LuGre, BRISTLES, "bristles that hold a body at rest.", check=_check_bristles),
+)
 
 
-def _lugre(e: Entry, level: Expr, viscous: Expr, static: str) -> LuGre | None:
-    for key in ("smoothing", "transition"):
-        e.refuse(key, "has no meaning in friction_law: lugre")
-    for key in _PLAIN[3:]:
-        if key not in e.values:
-            e.missing(key, "friction_law: lugre needs bristle_stiffness and bristle_damping")
-    pair = _onset(e, level, static)
-    if pair is None or e.at_fault():
-        return None
-    return LuGre(level, e.positive("bristle_stiffness"), e.positive("bristle_damping"), viscous, *pair, e.states())
+def friction_key(types: Types) -> Law:
+    """The key of a law of friction of a contact."""
+    flat = {"friction_law": "type", "friction": "dynamic", "static_friction": "static", "viscous_friction": "viscous"}
+    bristles = {"bristle_stiffness": "stiffness", "bristle_damping": "damping"}
+    return Law("law of friction", types, "coulomb", flat | bristles)
+
+
+FRICTION = friction_key(FRICTIONS)
 
 
 # -- symbols of reactions ----------------------------------------------------------------------------------------------
@@ -540,8 +502,8 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if (kind := e["friction_law"]) != "coulomb":
         e.fault("friction_law", f"{kind} has no coefficient", "leave friction_law out, or give coulomb")
         return None
-    for key in ("transition", "bristle_stiffness", "bristle_damping"):
-        e.refuse(key, "has no meaning beside coefficient")
+    for one in ("transition", "bristle_stiffness", "bristle_damping"):
+        e.refuse(one, "has no meaning beside coefficient")
     if "smoothing" not in e.values:
         e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
@@ -549,9 +511,9 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
         e[key] for key in ("coefficient", "static_coefficient", "coulomb", "static")
     )
     raw = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
-    for key, value in raw.items():
+    for one, value in raw.items():
         if value is not None:
-            e.require(key, value, NOT_NEGATIVE, "must be 0 or greater")
+            e.require(one, value, NOT_NEGATIVE, "must be 0 or greater")
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
         message = "is missing" if "stribeck" not in e.values else "is given without static_coefficient or static"
         remedy = "give stribeck together with static_coefficient or static, or none of them"
@@ -574,18 +536,18 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
             "radius", f"is missing, and {result.name!r} is an angle", "give the radius of the pin (m)", "EG-MISSING"
         )
         return None
-    for key in ("radius", "thrust_radius"):
-        if key in e.values and not turns:
-            e.fault(key, f"has no meaning: {result.name!r} is a length", f"leave {key} out")
+    for one in ("radius", "thrust_radius"):
+        if one in e.values and not turns:
+            e.fault(one, f"has no meaning: {result.name!r} is a length", f"leave {one} out")
             return None
     smoothing = e.positive("smoothing")
     stribeck = e.positive("stribeck") if "stribeck" in e.values else None
     zero = e.graph.zero
-    dry = Friction(zero if preload is None else preload, smoothing, zero if viscous is None else viscous)
+    preload, along = (zero if x is None else x for x in (preload, viscous))
     return ReactionFriction(
         e.name,
         path,
-        dry if breakaway is None else replace(dry, static=breakaway, stribeck=stribeck),
+        Friction(preload, smoothing, along, breakaway, None if breakaway is None else stribeck),
         result.joint,
         Friction(coefficient, smoothing, zero, onset, None if onset is None else stribeck),
         e.positive("radius") if "radius" in e.values else None,
@@ -622,26 +584,33 @@ class JointFriction(PathForce):
         return self.law.rates_along(self.path.measure(view)[1])
 
 
+#: Keys of laws of friction -> those of friction in a joint, which are forces or torques.
+_IN_JOINT = {
+    **dict.fromkeys(("static", "stribeck", "smoothing", "viscous", "transition")),
+    "type": "friction_law",
+    "dynamic": "coulomb",
+    "stiffness": "bristle_stiffness",
+    "damping": "bristle_damping",
+}
+
+
 def _joint_friction(e: Entry) -> Force | None:
     path, viscous = read_coordinate(e), e["viscous"]
-    if viscous is not None:
-        e.require("viscous", viscous, NOT_NEGATIVE, "must be 0 or greater")
     if "coefficient" in e.values:
         return read_reaction_friction(e, path, viscous)
-    for key in BY_REACTION:
-        if key in e.values:
-            e.fault(key, "is given without coefficient", f"give coefficient, or leave {key} out", "EG-MISSING")
-    dry = read_friction(e, "coulomb", "static", "viscous", only=True)
-    if dry is None and "viscous" not in e.values and not e.at_fault():
+    for one in BY_REACTION:
+        if one in e.values:
+            e.fault(one, "is given without coefficient", f"give coefficient, or leave {one} out", "EG-MISSING")
+    names = {key: name or key for key, name in _IN_JOINT.items()}
+    values = {key: e.values[name] for key, name in names.items() if name in e.values}
+    if values.keys() - {"viscous"}:
+        law = e.as_law(FRICTION, e["friction_law"], values, e.path, names)
+        dry = None if law.element_type.read is None else law.element_type.read(law)
+        return None if path is None or dry is None else JointFriction(e.name, path, dry)
+    if viscous is None and not e.at_fault():
         remedy = "give viscous, coulomb with smoothing, coefficient with smoothing, or several"
         e.fault("", "has no friction law", remedy, "EG-MISSING")
-    if path is None:
-        return None
-    return (
-        JointFriction(e.name, path, dry)
-        if dry is not None
-        else Damper(e.name, path, e.graph.zero if viscous is None else viscous)
-    )
+    return None if path is None or viscous is None else Damper(e.name, path, viscous)
 
 
 def _states(values: Mapping[str, Any]) -> dict[str, str]:
@@ -655,7 +624,9 @@ TYPES = table(
         "the joint carries, or several of them.",
         {
             "joint": ON_JOINT.replace(required=True),
-            "viscous": Scalar("viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING),
+            "viscous": Scalar(
+                "viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING, allowed=NOT_NEGATIVE
+            ),
             "coulomb": Scalar("Coulomb friction (N m or N)", level=LAW, dimension=PUSH),
             "static": Scalar(
                 "static friction, at the onset of sliding (N m or N); give stribeck too", level=LAW, dimension=PUSH
@@ -666,9 +637,19 @@ TYPES = table(
                 dimension=RATE,
             ),
             "smoothing": Scalar("velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE),
-            **FRICTION_CHOICE,
-            "bristle_stiffness": FRICTION_CHOICE["bristle_stiffness"].replace(dimension=STIFFNESS),
-            "bristle_damping": FRICTION_CHOICE["bristle_damping"].replace(dimension=DAMPING),
+            "friction_law": Choice(
+                "law of friction: coulomb, the default, smoothed and with the Stribeck effect if wanted; brown_mcphee; "
+                "lugre, bristles that hold a body at rest",
+                default="coulomb",
+                choices=tuple(FRICTIONS),
+            ),
+            "transition": Scalar(
+                "velocity of friction_law brown_mcphee near which friction is largest", dimension=RATE
+            ),
+            "bristle_stiffness": Scalar(
+                "friction of friction_law lugre per deflection of the bristles", dimension=STIFFNESS
+            ),
+            "bristle_damping": Scalar("friction of friction_law lugre per rate of the deflection", dimension=DAMPING),
         },
         _joint_friction,
         states=_states,

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ...base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ...expr.core import Expr, sqrt
 from ...expr.records import dataclass
-from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE, REACH
-from ..element_type import ElementType, Entry, table
-from ..kinds import EXPONENT, LINEAR, Choice, Fields, Radii, Scalar
+from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
+from ..element_type import ElementType, Entry, Law, Types, key, law, table
+from ..kinds import EXPONENT, Choice, Fields, Radii, Scalar
 from ..looks import STOP, Seen
 from .force import Load, View, beyond_zero, map_law, where
 from .paths import ON_JOINT, PathForce, read_coordinate
 
-_PRESSURE = FORCE.times(LENGTH, -2)
-
-#: Laws of the force along the normal.
-NORMAL_LAWS = ("hunt_crossley", "hertz", LINEAR)
-RIGID = "rigid"  #: contact without penetration, of groups of shapes only
-
+_STIFFNESS = Scalar(
+    "stiffness k (N/m**n) in the normal force k d**n max(0, 1 + dissipation d_dot), d the penetration",
+    required=True,
+    dimension=PUSH,
+    exponent="exponent",
+    allowed=POSITIVE,
+)
+DISSIPATION = Scalar("dissipation (s/m)", dimension=NONE.times(RATE, -1), allowed=NOT_NEGATIVE)
 #: Names of the formulas for the dissipation from a coefficient of restitution; see :func:`dissipation_of`.
 RESTITUTIONS = ("hunt_crossley", "lankarani", "flores")
 
@@ -93,9 +95,14 @@ class HuntCrossley(NormalLaw):
     than 1 / lambda; there it is continuous, with a kink.
     """
 
-    stiffness: Expr
-    exponent: Expr
-    dissipation: Expr
+    stiffness: Expr = key(_STIFFNESS)
+    exponent: Expr = key(
+        Scalar(
+            "exponent n of the penetration", default=EXPONENT, dimension=NONE, allowed=Allowed(1.0),
+            remedy="must be at least 1; above 1 the stiffness begins without a jump",
+        )
+    )  # fmt: skip
+    dissipation: Expr = key(DISSIPATION.replace(doc="dissipation (s/m); or give restitution and velocity"))
 
     def force(self, depth: Expr, rate: Expr) -> Expr:
         gain = depth.graph.apply("max", 0.0, 1.0 + self.dissipation * rate)
@@ -117,8 +124,8 @@ class DampedLinear(NormalLaw):
     """
 
     formula: ClassVar[str] = r"F_n = \mathrm{max}(0, k d + c \dot{d}), \quad d > 0"
-    stiffness: Expr
-    damping: Expr
+    stiffness: Expr = key(_STIFFNESS.replace(doc="stiffness k (N/m)", dimension=STIFFNESS, exponent=""))
+    damping: Expr = key(Scalar("damping c (N s/m)", default=0, dimension=DAMPING, allowed=NOT_NEGATIVE))
 
     def force(self, depth: Expr, rate: Expr) -> Expr:
         pull = depth.graph.apply("max", 0.0, self.stiffness * depth + self.damping * rate)
@@ -217,115 +224,106 @@ class RigidLaw(NormalLaw):
         return depth.graph.zero
 
 
-NORMAL: Fields = {
-    "stiffness": Scalar(
-        "stiffness k (N/m**n) in the normal force k d**n max(0, 1 + dissipation d_dot), d the penetration",
-        required=True,
-        dimension=PUSH,
-        exponent="exponent",
+# -- keys --------------------------------------------------------------------------------------------------------------
+
+
+#: Instead of the dissipation.
+IMPACT: Fields = {
+    "restitution": Scalar(
+        "coefficient of restitution, from which the dissipation is computed",
+        dimension=NONE,
+        allowed=Allowed(0.0, 1.0, above=True),
+        remedy="must be greater than 0 and at most 1",
     ),
-    "exponent": Scalar("exponent n of the penetration", default=EXPONENT, dimension=NONE),
-    "dissipation": Scalar("dissipation (s/m); or give restitution and velocity", dimension=NONE.times(RATE, -1)),
-    "restitution": Scalar("coefficient of restitution, from which the dissipation is computed", dimension=NONE),
-    "velocity": Scalar("impact velocity (m/s) at which that restitution holds", dimension=RATE),
+    "velocity": Scalar("impact velocity (m/s) at which that restitution holds", dimension=RATE, allowed=POSITIVE),
     "formula": Choice(
         "formula that gives the dissipation from the restitution", default=RESTITUTIONS[0], choices=RESTITUTIONS
     ),
 }
-#: Which law it is, and what only some laws have.
-NORMAL_CHOICE: Fields = {
-    "normal_law": Choice(
-        "law of the normal force: hunt_crossley, the default; hertz, the same with the exponent 3/2; linear, "
-        "max(0, k d + damping d_dot)",
-        default=NORMAL_LAWS[0],
-        choices=NORMAL_LAWS,
-    ),
-    "damping": Scalar("damping c (N s/m) of normal_law linear", dimension=DAMPING),
-}
-#: Of bodies whose radii are known, instead of the stiffness.
+#: Of two bodies of known radii, instead of the stiffness.
 ELASTIC: Fields = {
-    "moduli": Radii("Young's moduli of both bodies (Pa), instead of the stiffness, with poisson", dimension=_PRESSURE),
-    "poisson": Radii("Poisson's ratios of both bodies, beside moduli", dimension=NONE),
+    "moduli": Radii(
+        "Young's moduli of both bodies (Pa), instead of the stiffness, with poisson",
+        dimension=FORCE.times(LENGTH, -2),
+        allowed=POSITIVE,
+    ),
+    "poisson": Radii(
+        "Poisson's ratios of both bodies, beside moduli",
+        dimension=NONE,
+        allowed=Allowed(-1.0, 0.5, above=True),
+        remedy="is above -1 and at most 0.5",
+    ),
 }
 
 
-def read_normal_law(e: Entry) -> NormalLaw:
-    """The law of the keys :data:`NORMAL` and :data:`NORMAL_CHOICE`, and :data:`ELASTIC` where the type has them."""
-    kind = e["normal_law"]
-    if kind == LINEAR:
-        return _linear(e)
-    e.refuse("damping", f"belongs to normal_law: linear; of {kind} the dissipation is damping / stiffness")
-    if kind == "hertz":
-        e.refuse("exponent", "is 3/2 in the law of Hertz")
-    if "moduli" in e.values or "poisson" in e.values:
-        return _elastic(e, kind)
-    _require_stiffness(e)
-    stiffness, exponent = e.positive("stiffness"), e["exponent"]
-    e.require("exponent", exponent, Allowed(1.0), "must be at least 1; above 1 the stiffness begins without a jump")
-    return HuntCrossley(stiffness, exponent, _dissipation(e))
+def _dissipation(e: Entry, value: Expr | None) -> Expr:
+    """Given as such, or through a coefficient of restitution; none of them means none."""
+    restitution, velocity, formula = (e[one] for one in IMPACT)
+    if value is not None:
+        for one in IMPACT:
+            if one in e.values:
+                e.fault(one, "dissipation is given too", "give dissipation, or restitution with velocity")
+        return value
+    if (restitution is None) != (velocity is None):
+        e.missing("velocity" if velocity is None else "restitution", "give restitution and velocity together")
+    elif "formula" in e.values and restitution is None:
+        remedy = "give restitution and velocity, or leave formula out"
+        e.fault("formula", "is given without restitution", remedy, "EG-MISSING")
+    known = restitution is not None and velocity is not None
+    return dissipation_of(restitution, velocity, formula) if known else e.graph.zero
 
 
-def _require_stiffness(e: Entry) -> None:
-    """Note that the stiffness is missing, of a type that may have moduli instead."""
-    if "stiffness" not in e.values and not e.fields["stiffness"].required:
-        e.missing("stiffness", "give it, or moduli and poisson with normal_law: hertz")
+def _check_dissipation(e: Entry, values: dict[str, Any]) -> None:
+    values["dissipation"] = _dissipation(e, values["dissipation"])
 
 
-def _linear(e: Entry) -> DampedLinear:
-    _require_stiffness(e)
-    for key in ("dissipation", "restitution", "velocity", "formula", "exponent", *ELASTIC):
-        e.refuse(key, "has no meaning in normal_law: linear, which has stiffness and damping")
-    damping = e["damping"]
-    if damping is not None:
-        e.require("damping", damping, NOT_NEGATIVE, "must be 0 or greater")
-    return DampedLinear(e.positive("stiffness"), e.graph.zero if damping is None else damping)
-
-
-def _elastic(e: Entry, kind: str) -> NormalLaw:
+def _hertz(e: Entry) -> HuntCrossley | None:
+    """Of a stiffness, or of the moduli of both bodies."""
+    exponent, dissipation = e.graph.constant(EXPONENT), _dissipation(e, e["dissipation"])
+    if not e.values.keys() & ELASTIC.keys():
+        if "stiffness" not in e.values:
+            e.missing("stiffness", "give it, or moduli and poisson" if "moduli" in e.fields else "give it")
+        stiffness = e["stiffness"]
+        return None if e.at_fault() else HuntCrossley(stiffness, exponent, dissipation)
     e.refuse("stiffness", "follows from moduli, poisson and the radii")
-    if kind != "hertz":
-        key = "moduli" if "moduli" in e.values else "poisson"
-        e.fault(key, f"belongs to normal_law: hertz, and this is {kind}", "give normal_law: hertz, or stiffness")
-    moduli, ratios = e["moduli"], e["poisson"]
-    for key in ELASTIC:
-        if key not in e.values:
-            e.missing(key, "give moduli and poisson together, two numbers each")
-    for key, result, right, rule in (
-        ("moduli", moduli, POSITIVE, "must be greater than 0"),
-        ("poisson", ratios, Allowed(-1.0, 0.5, above=True), "is above -1 and at most 0.5"),
-    ):
-        for k, x in enumerate(result or ()):
-            e.require(f"{key}[{k}]", x, right, rule)
-    exponent, dissipation = e.graph.constant(EXPONENT), _dissipation(e)
-    if moduli is None or ratios is None:
-        return HertzBodies(e.stand_in, exponent, dissipation)
+    moduli, ratios = (e[one] for one in ELASTIC)
+    for one in ELASTIC:
+        if one not in e.values:
+            e.missing(one, "give moduli and poisson together, two numbers each")
+    if e.at_fault():
+        return None
     (E1, E2), (nu1, nu2) = moduli, ratios
     modulus = 1.0 / ((1.0 - nu1 * nu1) / E1 + (1.0 - nu2 * nu2) / E2)
     return HertzBodies(4.0 / 3.0 * modulus, exponent, dissipation)
 
 
-def _dissipation(e: Entry) -> Expr:
-    """Given as such, or through a coefficient of restitution; none of them means none."""
-    restitution, velocity = e["restitution"], e["velocity"]
-    formula = e["formula"]
-    if "dissipation" in e.values:
-        for key in ("restitution", "velocity", "formula"):
-            if key in e.values:
-                e.fault(key, "dissipation is given too", "give dissipation, or restitution with velocity")
-        value: Expr = e["dissipation"]
-        e.require("dissipation", value, NOT_NEGATIVE, "must be 0 or greater")
-        return value
-    if restitution is None and velocity is None:
-        if "formula" in e.values:
-            remedy = "give restitution and velocity, or leave formula out"
-            e.fault("formula", "is given without restitution", remedy, "EG-MISSING")
-        return e.graph.zero
-    if restitution is None or velocity is None:
-        e.missing("velocity" if velocity is None else "restitution", "give restitution and velocity together")
-        return e.stand_in
-    e.require("restitution", restitution, Allowed(0.0, 1.0, above=True), "must be greater than 0 and at most 1")
-    e.require("velocity", velocity, POSITIVE, "must be greater than 0")
-    return dissipation_of(restitution, velocity, formula)
+def _hertz_law(elastic: Fields) -> ElementType:
+    keys = {"stiffness": _STIFFNESS.replace(required=False), "dissipation": DISSIPATION, **IMPACT}
+    return ElementType("hertz", "the same with the exponent 3/2.", keys | elastic, _hertz)
+
+
+_LAWS = table(
+    law(
+        HuntCrossley,
+        "hunt_crossley",
+        "k d**n max(0, 1 + dissipation d_dot) of the penetration d.",
+        IMPACT,
+        _check_dissipation,
+    ),
+    _hertz_law({}),
+    law(DampedLinear, "linear", "max(0, k d + c d_dot)."),
+)
+#: Where radii are known.
+CURVED_LAWS = _LAWS | table(_hertz_law(ELASTIC))
+_RENAMED = {"normal_law": "type"}
+
+
+def normal_key(types: Types, required: bool = True) -> Law:
+    """The key of a law of the normal force."""
+    return Law("law of the normal force", types, "hunt_crossley", _RENAMED, required)
+
+
+NORMAL = normal_key(_LAWS)
 
 
 # -- stops of a joint --------------------------------------------------------------------------------------------------
@@ -381,13 +379,13 @@ class JointStop(PathForce):
 
 
 def _stop(e: Entry) -> JointStop | None:
-    path, law = read_coordinate(e), read_normal_law(e)
+    path, law = read_coordinate(e), e.read_part("law")
     lower, upper = e["lower"], e["upper"]
     if lower is None and upper is None:
         e.fault("", "has no limit", "give lower, upper or both", "EG-MISSING")
     if lower is not None and upper is not None:
         e.require("upper", upper - lower, POSITIVE, "this is upper - lower; lower must be less than upper")
-    return None if path is None else JointStop(e.name, path, lower, upper, law)
+    return None if path is None or law is None else JointStop(e.name, path, lower, upper, law)
 
 
 TYPES = table(
@@ -396,10 +394,9 @@ TYPES = table(
         "elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both.",
         {
             "joint": ON_JOINT.replace(required=True),
-            "stiffness": NORMAL["stiffness"],
+            "law": NORMAL,
             "lower": Scalar("lower limit (rad or m)", dimension=REACH),
             "upper": Scalar("upper limit (rad or m)", dimension=REACH),
-            **{key: field for key, field in (NORMAL | NORMAL_CHOICE).items() if key != "stiffness"},
         },
         _stop,
     )

@@ -529,6 +529,6 @@ def _require_it(module: BoundModel, method: Any) -> None:
         names = module.info.rigid_only
         stored_times = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
         raise cannot(
-            f"contacts {names[0]!r} have normal_law: rigid, which exerts impulses, not forces: run with "
-            f"method='moreau' and step={stored_times}, or choose another normal_law"
+            f"contacts {names[0]!r} have the law rigid, which exerts impulses, not forces: run with "
+            f"method='moreau' and step={stored_times}, or choose another law"
         )
