@@ -141,8 +141,8 @@ class Module(BoundModel):
     if it has any, in SI units and radians, in the order of ``x_names``; q' = v but for Euler parameters.  Every state
     may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last axis.  Every call takes
     ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None`` to write into; calls of
-    positions alone take ``t=0.0`` too.  The callables below also take arrays p (n_p, k) and u (n_u, k), a column for
-    each state; multipliers and reactions only u.  Values by name are the same for all states.  A call that fails raises
+    positions alone take ``t=0.0`` too.  The callables below, multipliers and reactions also take arrays p (n_p, k) and
+    u (n_u, k), a column for each state.  Values by name are the same for all states.  A call that fails raises
     an :class:`~.errors.EvaluationError` with the time and the state.
 
     Parameters

@@ -18,7 +18,7 @@ from ..base.algebra import Array
 from ..base.limits.constraints import BALANCE as RANK
 from ..base.limits.constraints import UNMOVED
 from ..errors import cannot
-from ..runtime.constrained import ProjectedStates, evaluate, prepare, solve_multipliers
+from ..runtime.constrained import ProjectedStates, evaluate, multipliers, solve_multipliers
 from .limits import SEEN
 
 if TYPE_CHECKING:
@@ -402,11 +402,7 @@ def driving_forces(module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = N
         bring in is the force times the rate of the row's left side, so that a driver that holds ``theta - f(t)``
         at 0 exerts this torque along ``theta``.
     """
-    states = prepare(module, t, x, p, u)
-    table = joint_table(module)
-    values = states.shaped(
-        -solve_multipliers(states.jacobian(), states.residual(states.accelerations()), module.layout.scales)
-    )
+    table, values = joint_table(module), -multipliers(module, t, x, p, u)
     labels = [label for label, joint in zip(module.layout.constraint_labels, table["rows"], strict=True) if joint < 0]
     names = [label.partition(".")[0] for label in labels]
     result: dict[str, Array] = {}

@@ -112,7 +112,7 @@ def standard_parameters(module: BoundModel, /, p: Any = None) -> dict[str, float
     """
     names = standard_names(module)
     state, still = module.layout.q_reference, np.zeros(module.layout.n_v)  # of states too
-    terms = module.kernels.inertial_terms(state, still, still, p=_values(module, p))
+    terms = module.kernels.inertial_terms(state, still, still, p=_values(module, p, "standard_parameters"))
     return dict(zip(names, map(float, terms[:, MOTION:].ravel()), strict=True))
 
 
@@ -154,7 +154,7 @@ def regressor(
     """
     require_support(module.layout, "regressor")
     names, (q, v, a), single = _motion(module, q, v, a)
-    values, count, n_v = _values(module, p), q.shape[1], module.n_v
+    values, count, n_v = _values(module, p, "regressor"), q.shape[1], module.n_v
     result = np.empty((n_v, len(names), count))
     width = max(1, CHUNK // max(1, module.n_bodies * max((MOTION + 10) * n_v, 60)))
     for k in range(0, count, width):
@@ -185,14 +185,15 @@ def inertial_remainder(
     -------
     (n_v,) or (n_v, k) array
     """
+    p = _values(module, p, "inertial_remainder")
     pi = np.array(list(standard_parameters(module, p).values()))
-    whole = module.inverse_dynamics(q, v, a, p=_values(module, p), u=module.kernels.fail.vector("u", u, module.u), t=t)
+    whole = module.inverse_dynamics(q, v, a, p=p, u=module.kernels.fail.vector("u", u, module.u), t=t)
     return into(out, whole - np.tensordot(pi, regressor(module, q, v, a, p=p, t=t), (0, 1)))
 
 
-def _values(module: BoundModel, p: Any) -> Any:
+def _values(module: BoundModel, p: Any, call: str) -> Any:
     p = module.kernels.fail.vector("p", p, module.p)
-    return None if p is None else read_vector("p", p, module.n_p)
+    return None if p is None else read_vector(f"p of {call}, one set for all states,", p, module.n_p)
 
 
 def _motion(

@@ -116,7 +116,7 @@ def ensemble(
         save_figure(result.plot(plot[0]).figure, plot[1], dpi=150)
     varied, failures = sorted({**values, **axes}), result.failures()
     (table,) = result.tables
-    notes = [f"run {one.run} ended at t = {one.t:.6g} s: {one.message}" for one in failures[:SHOWN]]
+    notes = [str(one) for one in failures[:SHOWN]]
     if len(failures) > SHOWN:
         notes.append(f"... and {len(failures) - SHOWN} more of {result.count} failed")
     work.show(

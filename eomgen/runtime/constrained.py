@@ -14,7 +14,7 @@ from ..base.limits.constraints import STATE as RANK
 from ..base.scales import Scales
 from ..base.texts import shown
 from ..errors import ill_shaped, no_number
-from .argument_checks import as_real, read_number, read_numbers, read_vector, with_numbers
+from .argument_checks import as_real, read_number, read_numbers, with_numbers
 from .kernels import into
 
 if TYPE_CHECKING:
@@ -91,12 +91,9 @@ class ProjectedStates(NamedTuple):
         return into(out, np.ascontiguousarray(result[..., 0] if self.single else result))
 
 
-def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> ProjectedStates:
-    """Check and project states."""
+def read_states(module: BoundModel, t: ArrayLike, x: ArrayLike) -> tuple[Array, Array, bool]:
+    """Times (k,), states (n_x, k) and whether one state (n_x,) was given."""
     layout = module.layout
-    read = module.kernels.fail.vector
-    p, u = read("p", p, module.p), read("u", u, module.u)
-    p = None if p is None else read_vector("p", p, module.n_p)  # the same for all states
     state = read_numbers("x", x)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
         raise ill_shaped(
@@ -111,10 +108,14 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
         raise no_number(f"t must be a number or an array of them, not {shown(t)}")
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
         raise ill_shaped(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
-    times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
-    options = {"p": p, "u": u}
-    projected = module.project(np.ascontiguousarray(columns), t=times, **options)
-    return ProjectedStates(module, times, np.asarray(projected), options, single)
+    return np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:])), np.ascontiguousarray(columns), single
+
+
+def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> ProjectedStates:
+    """Check and project states, which have the same p and u."""
+    read, (times, columns, single) = module.kernels.fail.vector, read_states(module, t, x)
+    options = {"p": read("p", p, module.p), "u": read("u", u, module.u)}
+    return ProjectedStates(module, times, np.asarray(module.project(columns, times, **options)), options, single)
 
 
 def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
@@ -144,7 +145,7 @@ def multipliers(
     x : (n_x,) or (n_x, k) array
         States; projected onto the constraints first.
     p, u, out : optional
-        As for every kernel; u may also be (n_u, k), inputs of each state.
+        As for every kernel.
 
     Returns
     -------
@@ -169,19 +170,25 @@ def evaluate(
     u: Any = None,
     out: Array | None = None,
 ) -> Array:
-    """``find`` of all states; where inputs are given state by state, (n_u, k), of each state with its own."""
-    inputs = None if u is None or isinstance(u, Mapping) else read_numbers("u", u)
-    if inputs is None or inputs.ndim != 2:
+    """``find`` of all states; where p or u are given state by state, (n, k), of each with its own."""
+    own: dict[str, Array] = {}
+    for name, raw in (("p", p), ("u", u)):
+        values = None if raw is None or isinstance(raw, Mapping) else read_numbers(name, raw)
+        if values is not None and values.ndim > 1:
+            own[name] = values
+    if not own:
         states = prepare(module, t, x, p, u)
         return states.shaped(find(states), out)
-    states = prepare(module, t, x, p)
-    if states.single or inputs.shape != (module.n_u, len(states.t)):
-        raise ill_shaped(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
-    parts = [
-        find(prepare(module, states.t[k : k + 1], states.x[:, k : k + 1], p, np.ascontiguousarray(inputs[:, k])))
-        for k in range(len(states.t))
-    ]
-    return states.shaped(np.concatenate(parts, axis=-1), out)
+    times, columns, single = read_states(module, t, x)
+    for name, values in own.items():
+        n = module.n_p if name == "p" else module.n_u
+        if single or values.shape != (n, len(times)):
+            raise ill_shaped(f"{name} must have shape ({n},), or ({n}, k) for k states, not {values.shape}")
+    parts = []
+    for k in range(len(times)):
+        options = {"p": p, "u": u} | {name: np.ascontiguousarray(values[:, k]) for name, values in own.items()}
+        parts.append(find(prepare(module, times[k : k + 1], columns[:, k : k + 1], **options)))
+    return into(out, np.concatenate(parts, axis=-1))
 
 
 def free_motions(J: Array, scales: Scales) -> Array:

@@ -164,24 +164,30 @@ class ModelInfo:
         return result
 
 
-# -- rules -------------------------------------------------------------------------------------------------------------
+# -- allowed parameters ------------------------------------------------------------------------------------------------
 
 
-def broken_rules(rules: Sequence[Any], p: Array) -> Iterator[tuple[str, list[Flaw], list[int], list[int]]]:
-    """Place, flaws of the first run, parameters and runs of every rule that parameters (n_p, k) of k runs break.
+def refused_runs(info: ModelInfo, p: Array) -> dict[int, list[Problem]]:
+    """The runs whose parameters, of (n_p, k), the model itself could not declare, and what is wrong with these.
 
-    Sets of parameters of which a rule has no finite numbers are not judged by it.
+    Values that are not finite are told by whatever computes with them, and rules without finite numbers judge nothing.
     """
-    for path, rule, data, used, tape in rules:
-        first: list[Flaw] = []
-        runs: list[int] = []
-        for k, values in _to_look_at(rule, data, tape, p):
-            flaws = RULES[rule](values, *data)
-            if flaws:
-                runs.append(k)
-                first = first or flaws
-        if runs:
-            yield path, first, used, runs
+    result: dict[int, list[Problem]] = {}
+
+    def note(run: int, path: str, flaws: Sequence[Flaw], used: Sequence[int]) -> None:
+        raw = ", ".join(f"{info.p_names[k]} = {p[k, run]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
+        for flaw in flaws:
+            one = Problem(path + flaw.key, f"{flaw.message} with {raw}", flaw.remedy, code="EG-RANGE")
+            if one not in (problems := result.setdefault(run, [])):
+                problems.append(one)
+
+    for k, path, *data in info.ranges:
+        for run in np.flatnonzero(~Allowed(*data[:4]).has(p[k]) & np.isfinite(p[k])).tolist():
+            note(run, path, judge_range(p[k, run : run + 1], *data), [k])
+    for path, rule, data, used, tape in info.rules:
+        for run, values in _to_look_at(rule, data, tape, p):
+            note(run, path, RULES[rule](values, *data), used)
+    return result
 
 
 def _to_look_at(rule: str, data: Sequence[Any], tape: Any, p: Array) -> Iterator[tuple[int, Array]]:
@@ -203,26 +209,6 @@ def _rows(result: Sequence[Any], count: int) -> Array:
     return np.array([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in result])
 
 
-# -- allowed parameters ------------------------------------------------------------------------------------------------
-
-
-def require_allowed(info: ModelInfo, p: Array) -> None:
-    """Refuse values of parameters (n_p,), or (n_p, k) of many runs, that the model itself could not declare.
-
-    Values that are not finite are told by whatever computes with them.
-    """
-    columns, problems = p.reshape(len(p), -1), list[Problem]()
-    for k, path, *data in info.ranges:
-        wrong = np.flatnonzero(~Allowed(*data[:4]).has(columns[k]) & np.isfinite(columns[k]))
-        if len(wrong):
-            flaws = judge_range(columns[k, wrong[:1]], *data)
-            problems += faults(info, path, flaws, [k], p, wrong.tolist())
-    for path, flaws, used, runs in broken_rules(info.rules, columns):
-        problems += faults(info, path, flaws, used, p, runs)
-    if problems:
-        raise ParameterError(list(dict.fromkeys(problems)))
-
-
 def bounds_of(info: ModelInfo) -> dict[str, tuple[float, float]]:
     """The least and the greatest value of each parameter that is a number of an element by itself, as far as told."""
     result: dict[str, tuple[float, float]] = {}
@@ -231,20 +217,6 @@ def bounds_of(info: ModelInfo) -> dict[str, tuple[float, float]]:
         least = least if low is None else max(least, low)
         result[info.p_names[k]] = (least, most if high is None else min(most, high))
     return result
-
-
-def faults(
-    info: ModelInfo, path: str, flaws: Sequence[Flaw], used: Sequence[int], p: Array, runs: Sequence[int]
-) -> list[Problem]:
-    """Flaws of the first of the runs that break a rule, with the values of the parameters that it depends on."""
-    names, values = info.p_names, p.reshape(len(p), -1)[:, runs[0]]
-    raw = ", ".join(f"{names[k]} = {values[k]:.6g}" for k in used[:6]) + ", ..." * (len(used) > 6)
-    where = ""
-    if p.ndim > 1:
-        where = f" in run {runs[0]}" + f" and {len(runs) - 1} more" * (len(runs) > 1)
-    return [
-        Problem(path + flaw.key, f"{flaw.message} with {raw}{where}", flaw.remedy, code="EG-RANGE") for flaw in flaws
-    ]
 
 
 # -- the layout --------------------------------------------------------------------------------------------------------
@@ -424,18 +396,19 @@ class Layout:
         else:
             result = read_numbers(f"the {what}s", raw)
         if result.shape != (len(names),):
-            raise ill_shaped(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
+            many = "; simulate_many and calls of states take a column of them for each" * (result.ndim == 2)
+            wanted = f"({len(names)},) ({', '.join(names)})"
+            raise ill_shaped(f"the {what}s must have shape {wanted}, not {result.shape}{many}")
         if what == "parameter":
             self.require_allowed(result)
         return result
 
     def require_allowed(self, p: Array) -> None:
-        """Refuse parameters (n_p,), or (n_p, k) of many runs, that elements do not allow; the same again at no cost."""
-        if p.ndim > 1:
-            return require_allowed(self.info, p)
+        """Refuse parameters (n_p,) that elements do not allow; the same again at no cost."""
         raw = p.tobytes()
         if raw != self._allowed:
-            require_allowed(self.info, p)
+            if problems := refused_runs(self.info, p[:, None]).get(0):
+                raise ParameterError(problems)
             self._allowed = raw
 
 

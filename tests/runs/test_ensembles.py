@@ -128,6 +128,22 @@ def test_runs_that_fail_are_marked_and_say_why() -> None:
     assert (short.steps == 3).all()
 
 
+def test_runs_with_parameters_that_the_model_refuses_are_named_and_the_others_go_on(crank: Any) -> None:
+    start, grid = {"theta_dot": 10.0}, {"m_s": [-1.0, 0.5, 1.0], "r": [0.1, 0.12]}
+    runs = crank.simulate_many(0.1, start, grid=grid, t_eval=[0.05])
+    allowed = crank.simulate_many(0.1, start, grid=grid | {"m_s": [0.5, 1.0]}, t_eval=[0.05])
+    np.testing.assert_array_equal(runs.samples[:, :, 2:], allowed.samples)
+    for k, (failure, r) in enumerate(zip(runs.failures(), (0.1, 0.12), strict=True)):
+        assert (failure.run, failure.values) == (k, {"m_s": -1.0, "r": r})
+        assert str(failure).startswith(f"run {k} (r = {r}, m_s = -1) ended at t = 0 s: bodies.slider.mass: is -1")
+    for block in (1, 4):
+        parts = crank.simulate_many(0.1, start, grid=grid, t_eval=[0.05], block=block)
+        np.testing.assert_array_equal(parts.samples, runs.samples)
+        assert parts.failures() == runs.failures()
+    with pytest.raises(eg.ParameterError, match="bodies.slider.mass: is -1"):
+        crank.simulate_many(0.1, parameters={"m_s": [-1.0, -2.0]})
+
+
 @pytest.mark.parametrize("lanes", [0, None])
 def test_events_of_every_run(lanes: int | None) -> None:
     """To the bits of simulate one after the other, within the tolerance side by side."""
@@ -380,8 +396,12 @@ def test_parameters_by_column(target: str) -> None:
     each = np.array([crank.rhs(0.0, x[:, k], p=p[:, k]) for k in range(9)]).T
     np.testing.assert_allclose(crank.rhs(0.0, x, p=p), each, rtol=1e-13, atol=1e-13)
     refuses("EG-SHAPE p rhs (6, 9)", crank.rhs, 0.0, x[:, 0], p=p)
-    refuses("EG-SHAPE p (6,) (6, 9)", crank.multipliers, 0.0, x, p=p)
-    refuses("EG-SHAPE p (6,) (6, 9)", crank.regressor, x[:3], x[3:], x[3:], p=p)
+    for call in (crank.multipliers, crank.reactions):
+        alone = np.stack([call(0.0, x[:, k], p=p[:, k]) for k in range(9)], axis=-1)
+        np.testing.assert_array_equal(call(0.0, x, p=p), alone)
+    refuses("EG-SHAPE p (6,) (6, k) (6, 9)", crank.multipliers, 0.0, x[:, :4], p=p)
+    refuses("EG-SHAPE p regressor (6,) (6, 9)", crank.regressor, x[:3], x[3:], x[3:], p=p)
+    refuses("EG-SHAPE parameters (6,) (6, 9) simulate_many", crank.bind, p=p)
     many = np.tile(x, 100), np.tile(p, 100)
     tracemalloc.start()
     size = crank.rhs(0.0, many[0], p=many[1]).nbytes

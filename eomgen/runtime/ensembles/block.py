@@ -198,6 +198,12 @@ class RunBlock:
 def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None = None) -> RunBlock:
     """Run all of a block on threads, whose number changes no result; ``watch`` takes how many runs have ended."""
     varied, plan, count = runs.varied, runs.plan, runs.count
+    if varied.refused:
+        good = np.array([k for k in range(count) if k not in varied.refused], dtype=np.intp)
+        allowed = run_block(replace(runs, varied=varied.chosen(good, len(good), {})), threads, watch)
+        block = _spread(allowed, good, RunBlock.blank(runs, count, BAD_PARAMETERS))
+        block.texts.update(varied.refused)
+        return block
     x0, failed, texts = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
     core: Any = eager(runs.module.core)
     run = _run_compiled if plan.method in core.methods else _run_python
@@ -268,7 +274,6 @@ def _run_python(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch: 
     for k in range(len(x0)):
         try:
             own_p, own_u = (a if a.ndim == 1 else a[k] for a in (p, u))
-            module.layout.require_allowed(own_p)
             bound = module.rebound(own_p, own_u)
         except UsageError as error:
             status[k], block.texts[k] = BAD_PARAMETERS, str(error)

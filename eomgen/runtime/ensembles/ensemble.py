@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 PANELS = 3  #: columns that a notebook draws
 ROWS = 12  #: columns whose numbers it lists
 FAILURES = 5  #: runs that it names
+NAMED = 6  #: values of a run that its failure names
 STATISTICS = ("count", "mean", "variance", "least", "greatest")
 #: Of each run, and what it is.
 COLUMNS_DOC = {
@@ -49,6 +50,12 @@ class Failure(NamedTuple):
     status: int
     t: float  #: how far it came (s)
     message: str
+    values: dict[str, float]  #: of what differs between the runs, as ``varied()`` calls it
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{name} = {x:.6g}" for name, x in [*self.values.items()][:NAMED])
+        more = ", ..." * (len(self.values) > NAMED)
+        return f"run {self.run}{f' ({values}{more})' * bool(values)} ended at t = {self.t:.6g} s: {self.message}"
 
 
 class Ensemble(Result):
@@ -110,9 +117,10 @@ class Ensemble(Result):
 
     def failures(self) -> list[Failure]:
         """The runs that did not reach the end, with what stopped them."""
-        return [self._describe(int(k)) for k in np.flatnonzero(~self.ok)]
+        varied = self.varied()
+        return [self._describe(int(k), varied) for k in np.flatnonzero(~self.ok)]
 
-    def _describe(self, k: int) -> Failure:
+    def _describe(self, k: int, varied: dict[str, Array]) -> Failure:
         status, code = int(self.status[k]), int(self._failure[k])
         message = self._messages.get(k) or MEANING.get(status, f"status {status}")
         if code and k not in self._messages:
@@ -120,7 +128,7 @@ class Ensemble(Result):
 
             reason = WORDS.get(code, (f"status {code}",))[0]
             message += f"; last failure near t = {self._failure_time[k]:.6g} s: {reason}"
-        return Failure(k, status, float(self.t_end[k]), message)
+        return Failure(k, status, float(self.t_end[k]), message, {name: float(row[k]) for name, row in varied.items()})
 
     def __len__(self) -> int:
         return self.count
@@ -402,7 +410,7 @@ class Ensemble(Result):
         failed = self.failures()
         facts = [("runs", f"{self.count}" + (f", {len(failed)} of which failed" if failed else ""))]
         facts += [("times", f"{len(self.t)}"), ("end", f"{self.t[-1]:.6g} s")]
-        return facts + [(f"run {one.run} failed", f"at t = {one.t:.6g} s: {one.message}") for one in failed[:FAILURES]]
+        return facts + [("failed", str(one)) for one in failed[:FAILURES]]
 
     @property
     def tables(self) -> list[ResultTable]:

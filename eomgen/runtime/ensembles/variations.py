@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from ...base.algebra import Array, Indices
 from ...base.names import place_of_marker
 from ...base.value_rules import read_count
-from ...errors import AssemblyError, EomgenError, at_odds, ill_shaped, incomplete, no_number
+from ...errors import AssemblyError, EomgenError, ParameterError, at_odds, ill_shaped, incomplete, no_number
 from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_size, without_dots
 from ..initial import Initial
-from ..layout import warn_of_fixed
+from ..layout import refused_runs, warn_of_fixed
 from ..trajectory import last_state
 
 if TYPE_CHECKING:
@@ -84,6 +84,8 @@ class Variations:
         Named initial values where there are no states.
     starts_differ : bool
         Whether the positions where the runs start may differ; of all runs, also in a part of them.
+    refused : dict of int to str
+        Runs whose parameters the model does not allow, and why.
     """
 
     count: int
@@ -92,13 +94,20 @@ class Variations:
     states: Array | None
     values: dict[str, Any]
     starts_differ: bool = False
+    refused: dict[int, str] = field(default_factory=dict)
 
     def part(self, start: int, stop: int) -> Variations:
         """The runs from `start` to before `stop`."""
-        values = {name: x[start:stop] if np.ndim(x) else x for name, x in self.values.items()}
-        states = None if self.states is None else self.states[:, start:stop]
-        p, u = (a if a.ndim == 1 else a[:, start:stop] for a in (self.p, self.u))
-        return Variations(min(stop, self.count) - start, p, u, states, values, self.starts_differ)
+        runs = range(start, min(stop, self.count))
+        refused = {k - start: self.refused[k] for k in runs if k in self.refused} if self.refused else {}
+        return self.chosen(slice(start, runs.stop), len(runs), refused)
+
+    def chosen(self, runs: slice | Indices, count: int, refused: dict[int, str]) -> Variations:
+        """Some of the runs, so many, and which of them are refused."""
+        values = {name: x[runs] if np.ndim(x) else x for name, x in self.values.items()}
+        states = None if self.states is None else self.states[:, runs]
+        p, u = (a if a.ndim == 1 else a[:, runs] for a in (self.p, self.u))
+        return replace(self, count=count, p=p, u=u, states=states, values=values, refused=refused)
 
     @property
     def differ(self) -> bool:
@@ -162,7 +171,7 @@ def collect_variations(
     """Bring initial values, parameters and inputs together, each by name, or as arrays (n,) or (n, k).
 
     The number of runs is the count where no array gives it.  Unknown names, values that are not finite, and lengths
-    that differ are refused, all named.
+    that differ are refused, all named; parameters that the model does not allow only where no run has others.
     """
     lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
     p = _bound("parameter", module, parameters, lengths)
@@ -186,7 +195,7 @@ def collect_variations(
     require_size(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
-    varied = Variations(k, p, u, states, values)
+    varied = Variations(k, p, u, states, values, refused=_refused(module, p, k))
     rows = varied.deciding(module.layout)
     differ = any(np.ndim(value) and name in module.layout.q for name, value in values.items())
     return replace(varied, starts_differ=bool(differ or (rows != rows[:, :1]).any()))
@@ -196,13 +205,6 @@ def _bound(what: str, module: BoundModel, raw: Any, lengths: dict[str, int]) -> 
     """Values (n,) or (n, k) of parameters or inputs; those not given keep the bound ones."""
     if raw is None:
         return module.p if what == "parameter" else module.u
-    result = _read_bound(what, module, raw, lengths)
-    if what == "parameter":
-        module.layout.require_allowed(result)
-    return result
-
-
-def _read_bound(what: str, module: BoundModel, raw: Any, lengths: dict[str, int]) -> Array:
     layout = module.layout
     names, base = (layout.p, module.p) if what == "parameter" else (layout.u, module.u)
     if not isinstance(raw, Mapping):
@@ -216,6 +218,14 @@ def _read_bound(what: str, module: BoundModel, raw: Any, lengths: dict[str, int]
     for name, value in values.items():
         result[names.index(name)] = value
     return result
+
+
+def _refused(module: BoundModel, p: Array, count: int) -> dict[int, str]:
+    """Why runs with parameters (n_p,) or (n_p, k) do not begin, by run; refused at once where none would."""
+    problems = refused_runs(module.info, p.reshape(len(p), -1))
+    if problems and len(problems) == (p.shape[1] if p.ndim > 1 else 1):
+        raise ParameterError(problems[0])
+    return {k: str(ParameterError(one)) for k, one in problems.items()}
 
 
 def _require_one_length(lengths: Mapping[str, int]) -> None:
