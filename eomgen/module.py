@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     from .runtime.drawing import draw as _draw
     from .runtime.drawing import draw_branches as _draw_branches
     from .runtime.drawing import report as _report
-    from .runtime.ensembles.simulate_many import simulate_many as _simulate_many
+    from .runtime.ensembles.ensemble import simulate_many as _simulate_many
     from .runtime.minimal import Minimal
-    from .runtime.runs.compiled import step as _step
     from .runtime.runs.dae_solution import Dae
     from .runtime.runs.integrator import integrator as _integrator
+    from .runtime.runs.integrator import step as _step
     from .runtime.runs.simulate import simulate as _simulate
     from .verify.verify import verify as _verify
 
@@ -53,9 +53,9 @@ if TYPE_CHECKING:
 #: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
 CALLS: dict[str, str | Callable[..., Any]] = {
     "simulate": "runtime.runs.simulate",
-    "simulate_many": "runtime.ensembles.simulate_many",
+    "simulate_many": "runtime.ensembles.ensemble",
     "integrator": "runtime.runs.integrator",
-    "step": "runtime.runs.compiled",
+    "step": "runtime.runs.integrator",
     "verify": "verify.verify",
     "linearize": "analysis.linear",
     "modes": "analysis.modes",
@@ -272,7 +272,7 @@ class Module(BoundModel):
 
         def __getattr__(self, name: str) -> Any:
             if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-                from .runtime.runs.compiled import find_solver
+                from .runtime.runs.integrator import find_solver
 
                 return find_solver(self, name)
             if name in CALLS:  # an analysis of a user's own

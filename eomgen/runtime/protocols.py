@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeAlias, TypedDict
+from typing import Any, Protocol, TypeAlias, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -21,88 +21,56 @@ class Call(Protocol):
     def __call__(self, *args: Any, **raw: Any) -> Array: ...
 
 
+class Bound(TypedDict, total=False):
+    """The other names of ``p`` and ``u``."""
+
+    parameters: Given
+    inputs: Given
+
+
 class Timed(Protocol):
     """A kernel of time and state; ``jacobian`` by the state, ``wrt="u"`` or ``wrt="p"``."""
 
     def __call__(
-        self,
-        t: ArrayLike,
-        x: ArrayLike,
-        p: Given = None,
-        u: Given = None,
-        out: Array | None = None,
-        wrt: str | None = None,
-        *,
-        parameters: Given = None,
-        inputs: Given = None,
-    ) -> Array: ...
+        self, t: ArrayLike, x: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None,
+        wrt: str | None = None, **raw: Unpack[Bound],
+    ) -> Array: ...  # fmt: skip
 
 
 class State(Protocol):
     """A kernel of the state, or of the coordinates, alone."""
 
     def __call__(
-        self,
-        x: ArrayLike,
-        p: Given = None,
-        u: Given = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-        *,
-        parameters: Given = None,
-        inputs: Given = None,
-    ) -> Array: ...
+        self, x: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None, t: ArrayLike = 0.0,
+        **raw: Unpack[Bound],
+    ) -> Array: ...  # fmt: skip
 
 
 class Projection(Protocol):
     """The projection, whose second argument is the time: the constraints of drivers move with it."""
 
     def __call__(
-        self,
-        x: ArrayLike,
-        t: ArrayLike = 0.0,
-        p: Given = None,
-        u: Given = None,
-        out: Array | None = None,
-        *,
-        parameters: Given = None,
-        inputs: Given = None,
-    ) -> Array: ...
+        self, x: ArrayLike, t: ArrayLike = 0.0, p: Given = None, u: Given = None, out: Array | None = None,
+        **raw: Unpack[Bound],
+    ) -> Array: ...  # fmt: skip
 
 
 class Rows(Protocol):
     """Constraints, their Jacobian or rates: of the independent rows, or of all with ``rows="all"``."""
 
     def __call__(
-        self,
-        q: ArrayLike,
-        p: Given = None,
-        u: Given = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-        rows: str = "independent",
-        *,
-        parameters: Given = None,
-        inputs: Given = None,
-    ) -> Array: ...
+        self, q: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None, t: ArrayLike = 0.0,
+        rows: str = "independent", **raw: Unpack[Bound],
+    ) -> Array: ...  # fmt: skip
 
 
 class Motion(Protocol):
     """A kernel of coordinates, velocities and accelerations."""
 
     def __call__(
-        self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
-        p: Given = None,
-        u: Given = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-        *,
-        parameters: Given = None,
-        inputs: Given = None,
-    ) -> Array: ...
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None,
+        t: ArrayLike = 0.0, **raw: Unpack[Bound],
+    ) -> Array: ...  # fmt: skip
 
 
 class Core(Protocol):

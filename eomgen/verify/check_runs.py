@@ -19,9 +19,8 @@ from ..base.algebra import Array
 from ..base.limits.constraints import ACCEPTED
 from ..errors import EomgenError, SimulationError
 from ..runtime.argument_checks import require
-from ..runtime.runs.compiled import step
 from ..runtime.runs.events import Events
-from ..runtime.runs.integrator import integrator
+from ..runtime.runs.integrator import integrator, step
 from ..runtime.runs.simulate import simulate
 from .checked import CheckedModel
 from .finding import RIGID, Comparison, Finding, size_of

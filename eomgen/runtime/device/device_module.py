@@ -23,13 +23,37 @@ if TYPE_CHECKING:
 #: Kernels of a device that are called with the time first, as functions of a module; others take it by name.
 TIMED_ON_DEVICE = ("rhs", "jacobian", "bias", "outputs", "events")
 
-# -- functions ---------------------------------------------------------------------------------------------------------
-
 # States are columns, as in the batches of a module: an array (n, k) in C order holds k of them.
 
 
-class DeviceFunctions:
-    """What :class:`~.device_module.DeviceModule` has besides runs, and what runs need of it."""
+class DeviceModule:
+    """The functions of a model on a device.
+
+    ``rhs(t, x, p=None, u=None)`` and the others have the arguments of a module: x (n_x,) or (n_x, k); t, p and u the
+    same for all states, or (k,), (n_p, k), (n_u, k).  Arrays of NumPy are copied to the device and the result comes
+    back as an array of NumPy; where one of the states is an array on the device (of CuPy, PyTorch, JAX or Numba), the
+    result is a :class:`~.cuda_device.DeviceArray`.  An entry is NaN where the state has no value there; with
+    ``status=True`` the result is (result, status), with 0 where all is well.
+
+    Parameters
+    ----------
+    text : str
+        Device code, as ``emit_device_text`` gives it.
+    facts : mapping
+        As ``describe_device`` gives them.
+    metadata : mapping
+        Of the model.
+    device : Device, optional
+        The first GPU by default.
+
+    Attributes
+    ----------
+    q_names, v_names, x_names, u_names, p_names, y_names : tuple of str
+    p, u : arrays
+        Declared values.
+    x0 : (n_x,) array
+        A consistent state.
+    """
 
     def __init__(
         self, text: str, facts: Mapping[str, Any], metadata: Mapping[str, Any], device: Device | None = None
@@ -106,12 +130,144 @@ class DeviceFunctions:
             self._constants = result
         return result, each is not None
 
+    def simulate_many(
+        self,
+        span: Span,
+        x0: Any,
+        p: Any = None,
+        u: Any = None,
+        *,
+        method: str | None = None,
+        t_eval: ArrayLike | None = None,
+        rtol: float | None = None,
+        atol: ArrayLike | None = None,
+        max_step: float | None = None,
+        first_step: float | None = None,
+        step: float | None = None,
+        max_steps: int = 1_000_000,
+        keep_events: int = 16,
+    ) -> RunBlock:
+        """Integrate the equations of motion from many states, every run with steps of its own.
+
+        Parameters
+        ----------
+        span : (float, float) or float
+            Times of start and end, or the end of a run from 0.
+        x0 : (n_x, k) array
+            Where the runs start, on the constraints; also an array on the device.
+        p, u : (n_p,) or (n_p, k), (n_u,) or (n_u, k) arrays, optional
+            Parameters and constant inputs; the declared values by default.
+        method : {'DOP853', 'RK4'}, optional
+            DOP853 controls its steps, each run its own; RK4 takes steps of the size `step`.
+        t_eval : (m,) array, optional
+            Times to store; the end alone by default.
+        rtol, atol, max_step, first_step
+            As for ``simulate``.
+        step : float, optional
+            Size of the steps of RK4 (s), and only of it.
+        max_steps : int
+            A run that takes more is given up.
+        keep_events : int
+            Events of the model to keep of each run, the first ones.
+
+        Returns
+        -------
+        RunBlock
+            With arrays of NumPy: what became of the runs, as of a block of an ensemble.
+
+        Raises
+        ------
+        UsageError
+            Wrong shapes or values; a model whose runs need Python.
+        """
+        options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
+        if self.facts["no_runs"]:
+            raise cannot(f"simulate_many of {self.name!r} on a device: {self.facts['no_runs']}")
+        like = cast("BoundModel", self)  # metadata and n_dof are all that is read
+        declared, device, n = declare(like), self.device, self.n_x
+        start, end = find_span(span, float(declared["end"]))
+        if self.info.clocks and (start != 0.0 or end < 0.0):
+            raise cannot(
+                "runs on a device of a model with sampled states begin at 0 s and go forward, not from "
+                f"{start:.6g} s to {end:.6g} s; use simulate_many of the module"
+            )
+        method, step = declared_step(like, declared["method"] if method is None else method, step)
+        methods = [name.upper() for name in self.facts["methods"]]
+        if method not in methods:
+            raise no_choice(f"no method {method!r} on a device; there are {', '.join(methods)}")
+        chosen = steps_of(like, (start, end), method, step, options)
+        if not isinstance(chosen["rtol"], float):
+            raise ill_shaped(f"rtol must be one number on a device, not of shape {np.shape(chosen['rtol'])}")
+        times = np.empty(0) if t_eval is None else ordered_times(t_eval, start, end, n)
+        most, keep = read_count("max_steps", max_steps, 1), read_count("keep_events", keep_events, 1)
+        states, count = self.columns("x0", x0, n)
+        if count is None:
+            states, count = states.reshaped((n, 1)), 1
+        parameters, each_p = self.columns("p", self.p if p is None else p, self.n_p, count)
+        inputs, each_u = self.columns("u", self.u if u is None else u, self.n_u, count)
+        events = len(self.info.events)
+        kept = keep if events else 0
+        shapes = {
+            "times": (len(times),), "samples": (count, len(times), n), "x": (n, count), "t": (count,),
+            "status": (count,), "counts": (3, count), "failure": (count,), "failure_time": (count,),
+            "notes": (count, kept, 2 + n), "noted": (count,),
+        }  # fmt: skip
+        kinds = {"status": np.int32, "failure": np.int32, "counts": np.int64, "noted": np.int64}
+        made = {name: device.empty(shape, kinds.get(name, np.float64)) for name, shape in shapes.items()}
+        if events:
+            made["notes"] = device.put(np.full(shapes["notes"], np.nan))
+        results = ("times", "samples", "x", "t", "status", "counts", "failure", "failure_time")
+        launch = self.kernel(f"{method.lower()}_runs", "runs", method)
+        if not count:
+            raise ill_shaped("x0 holds no states; give one column for each run")
+        nodes, tolerances = device.put(np.array([start, end])), device.put(np.broadcast_to(chosen["atol"], (n,)) * 1.0)
+        launch(
+            count, nodes, np.int32(2), states, parameters, np.int64(each_p is not None), inputs,
+            np.int64(each_u is not None), np.float64(chosen["rtol"]), tolerances,
+            np.float64(chosen.get("max_step", np.inf)), np.float64(chosen.get("first_step", 0.0)), np.int64(most),
+            device.put(times), np.int64(len(times)), *(made[name] for name in results),
+            *((made["notes"], np.int64(kept), made["noted"]) if events else ()),
+        )  # fmt: skip
+        result = {name: made[name].numpy() for name in shapes if name != "times"}
+        steps, rejected, evaluations = result["counts"]
+        x = _projected(self, result["x"], result["t"], p, u)
+        samples = None
+        if t_eval is not None:
+            samples = np.ascontiguousarray(result["samples"].transpose(2, 1, 0))
+            every = np.broadcast_to(times[:, None], samples.shape[1:])
+            samples = _projected(self, samples, every, p, u)
+        notes = None
+        if events:
+            notes = np.ascontiguousarray(result["notes"].transpose(2, 1, 0))
+            notes[2:] = _projected(self, notes[2:], notes[1], p, u)
+        return RunBlock(
+            x, result["t"], samples, result["status"], result["failure"], result["failure_time"], steps, rejected,
+            evaluations, result["noted"] if events else np.zeros(count, dtype=np.int64), notes,
+        )  # fmt: skip
+
+
+def _projected(module: DeviceModule, x: Array, t: Array, p: Any, u: Any) -> Array:
+    """States (n_x, ..., k) at times (..., k) brought onto the constraints; NaN stays NaN."""
+    if "project" not in module.facts["kernels"] or not x.size:
+        return x
+    flat = np.ascontiguousarray(x.reshape(x.shape[0], -1))
+    repeated = [None if raw is None else _repeated(module, raw, flat.shape[1] // x.shape[-1]) for raw in (p, u)]
+    result = module.call("project")(flat, *repeated, t=np.ascontiguousarray(t).ravel())
+    return np.asarray(result).reshape(x.shape)
+
+
+def _repeated(module: DeviceModule, raw: Any, times: int) -> Any:
+    """Parameters of k runs for as many states of each."""
+    there = module.device.view(raw)
+    array = np.asarray(raw, dtype=float) if there is None else there.numpy()
+    return np.tile(array, (1, times)) if array.ndim == 2 else array
+
 
 class BatchCall:
     """One function of a model on a device."""
 
     def __init__(
-        self, module: DeviceFunctions, name: str, ports: Sequence[tuple[str, int]], shape: tuple[int, ...]
+        self, module: DeviceModule, name: str, ports: Sequence[tuple[str, int]], shape: tuple[int, ...]
     ) -> None:
         self.module, self.name, self.ports, self.shape = module, name, ports, shape
         labels = [port for port, _ in ports]
@@ -167,190 +323,3 @@ class BatchCall:
         if there.shape not in ((), (1,), (count,)):
             raise ill_shaped(f"t must be a number or of shape ({count},), not {there.shape}")
         return there, there.shape == (count,) and count > 1
-
-
-# -- runs --------------------------------------------------------------------------------------------------------------
-
-
-def carry_out(
-    module: DeviceFunctions,
-    span: Span,
-    x0: Any,
-    p: Any,
-    u: Any,
-    method: str | None,
-    t_eval: ArrayLike | None,
-    options: Mapping[str, Any],
-    step: float | None,
-    max_steps: int,
-    keep_events: int,
-) -> RunBlock:
-    """Run every column of x0; see :meth:`~.device_module.DeviceModule.simulate_many`."""
-    if module.facts["no_runs"]:
-        raise cannot(f"simulate_many of {module.name!r} on a device: {module.facts['no_runs']}")
-    like = cast("BoundModel", module)  # metadata and n_dof are all that is read
-    declared, device, n = declare(like), module.device, module.n_x
-    start, end = find_span(span, float(declared["end"]))
-    if module.info.clocks and (start != 0.0 or end < 0.0):
-        raise cannot(
-            f"runs on a device of a model with sampled states begin at 0 s and go forward, not from {start:.6g} s to "
-            f"{end:.6g} s; use simulate_many of the module"
-        )
-    method, step = declared_step(like, declared["method"] if method is None else method, step)
-    methods = [name.upper() for name in module.facts["methods"]]
-    if method not in methods:
-        raise no_choice(f"no method {method!r} on a device; there are {', '.join(methods)}")
-    chosen = steps_of(like, (start, end), method, step, options)
-    if not isinstance(chosen["rtol"], float):
-        raise ill_shaped(f"rtol must be one number on a device, not of shape {np.shape(chosen['rtol'])}")
-    times = np.empty(0) if t_eval is None else ordered_times(t_eval, start, end, n)
-    most, keep = read_count("max_steps", max_steps, 1), read_count("keep_events", keep_events, 1)
-    states, count = module.columns("x0", x0, n)
-    if count is None:
-        states, count = states.reshaped((n, 1)), 1
-    parameters, each_p = module.columns("p", module.p if p is None else p, module.n_p, count)
-    inputs, each_u = module.columns("u", module.u if u is None else u, module.n_u, count)
-    events = len(module.info.events)
-    kept = keep if events else 0
-    shapes = {
-        "times": (len(times),), "samples": (count, len(times), n), "x": (n, count), "t": (count,),
-        "status": (count,), "counts": (3, count), "failure": (count,), "failure_time": (count,),
-        "notes": (count, kept, 2 + n), "noted": (count,),
-    }  # fmt: skip
-    kinds = {"status": np.int32, "failure": np.int32, "counts": np.int64, "noted": np.int64}
-    made = {name: device.empty(shape, kinds.get(name, np.float64)) for name, shape in shapes.items()}
-    if events:
-        made["notes"] = device.put(np.full(shapes["notes"], np.nan))
-    results = ("times", "samples", "x", "t", "status", "counts", "failure", "failure_time")
-    launch = module.kernel(f"{method.lower()}_runs", "runs", method)
-    if not count:
-        raise ill_shaped("x0 holds no states; give one column for each run")
-    nodes, atol = device.put(np.array([start, end])), device.put(np.broadcast_to(chosen["atol"], (n,)) * 1.0)
-    launch(
-        count, nodes, np.int32(2), states, parameters, np.int64(each_p is not None), inputs,
-        np.int64(each_u is not None), np.float64(chosen["rtol"]), atol,
-        np.float64(chosen.get("max_step", np.inf)), np.float64(chosen.get("first_step", 0.0)), np.int64(most),
-        device.put(times), np.int64(len(times)), *(made[name] for name in results),
-        *((made["notes"], np.int64(kept), made["noted"]) if events else ()),
-    )  # fmt: skip
-    result = {name: made[name].numpy() for name in shapes if name != "times"}
-    steps, rejected, evaluations = result["counts"]
-    x = _projected(module, result["x"], result["t"], p, u)
-    samples = None
-    if t_eval is not None:
-        samples = np.ascontiguousarray(result["samples"].transpose(2, 1, 0))
-        every = np.broadcast_to(times[:, None], samples.shape[1:])
-        samples = _projected(module, samples, every, p, u)
-    notes = None
-    if events:
-        notes = np.ascontiguousarray(result["notes"].transpose(2, 1, 0))
-        notes[2:] = _projected(module, notes[2:], notes[1], p, u)
-    return RunBlock(
-        x, result["t"], samples, result["status"], result["failure"], result["failure_time"], steps, rejected,
-        evaluations, result["noted"] if events else np.zeros(count, dtype=np.int64), notes,
-    )  # fmt: skip
-
-
-def _projected(module: DeviceFunctions, x: Array, t: Array, p: Any, u: Any) -> Array:
-    """States (n_x, ..., k) at times (..., k) brought onto the constraints; NaN stays NaN."""
-    if "project" not in module.facts["kernels"] or not x.size:
-        return x
-    flat = np.ascontiguousarray(x.reshape(x.shape[0], -1))
-    repeated = [None if raw is None else _repeated(module, raw, flat.shape[1] // x.shape[-1]) for raw in (p, u)]
-    result = module.call("project")(flat, *repeated, t=np.ascontiguousarray(t).ravel())
-    return np.asarray(result).reshape(x.shape)
-
-
-def _repeated(module: DeviceFunctions, raw: Any, times: int) -> Any:
-    """Parameters of k runs for as many states of each."""
-    there = module.device.view(raw)
-    array = np.asarray(raw, dtype=float) if there is None else there.numpy()
-    return np.tile(array, (1, times)) if array.ndim == 2 else array
-
-
-# -- the module --------------------------------------------------------------------------------------------------------
-
-# States are columns, as in the batches of a module: an array (n, k) in C order holds k of them.
-
-
-class DeviceModule(DeviceFunctions):
-    """The functions of a model on a device.
-
-    ``rhs(t, x, p=None, u=None)`` and the others have the arguments of a module: x (n_x,) or (n_x, k); t, p and u the
-    same for all states, or (k,), (n_p, k), (n_u, k).  Arrays of NumPy are copied to the device and the result comes
-    back as an array of NumPy; where one of the states is an array on the device (of CuPy, PyTorch, JAX or Numba), the
-    result is a :class:`~.cuda_device.DeviceArray`.  An entry is NaN where the state has no value there; with
-    ``status=True`` the result is (result, status), with 0 where all is well.
-
-    Parameters
-    ----------
-    text : str
-        Device code, as ``emit_device_text`` gives it.
-    facts : mapping
-        As ``describe_device`` gives them.
-    metadata : mapping
-        Of the model.
-    device : Device, optional
-        The first GPU by default.
-
-    Attributes
-    ----------
-    q_names, v_names, x_names, u_names, p_names, y_names : tuple of str
-    p, u : arrays
-        Declared values.
-    x0 : (n_x,) array
-        A consistent state.
-    """
-
-    def simulate_many(
-        self,
-        span: Span,
-        x0: Any,
-        p: Any = None,
-        u: Any = None,
-        *,
-        method: str | None = None,
-        t_eval: ArrayLike | None = None,
-        rtol: float | None = None,
-        atol: ArrayLike | None = None,
-        max_step: float | None = None,
-        first_step: float | None = None,
-        step: float | None = None,
-        max_steps: int = 1_000_000,
-        keep_events: int = 16,
-    ) -> RunBlock:
-        """Integrate the equations of motion from many states, every run with steps of its own.
-
-        Parameters
-        ----------
-        span : (float, float) or float
-            Times of start and end, or the end of a run from 0.
-        x0 : (n_x, k) array
-            Where the runs start, on the constraints; also an array on the device.
-        p, u : (n_p,) or (n_p, k), (n_u,) or (n_u, k) arrays, optional
-            Parameters and constant inputs; the declared values by default.
-        method : {'DOP853', 'RK4'}, optional
-            DOP853 controls its steps, each run its own; RK4 takes steps of the size `step`.
-        t_eval : (m,) array, optional
-            Times to store; the end alone by default.
-        rtol, atol, max_step, first_step
-            As for ``simulate``.
-        step : float, optional
-            Size of the steps of RK4 (s), and only of it.
-        max_steps : int
-            A run that takes more is given up.
-        keep_events : int
-            Events of the model to keep of each run, the first ones.
-
-        Returns
-        -------
-        RunBlock
-            With arrays of NumPy: what became of the runs, as of a block of an ensemble.
-
-        Raises
-        ------
-        UsageError
-            Wrong shapes or values; a model whose runs need Python.
-        """
-        options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step}
-        return carry_out(self, span, x0, p, u, method, t_eval, options, step, max_steps, keep_events)

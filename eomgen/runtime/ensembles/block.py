@@ -22,13 +22,12 @@ from ...base.texts import shown
 from ...errors import EomgenError, MissingDependencyError, UsageError, bad_data, bad_file, cannot, ill_typed, no_choice
 from ..inputs import Forcing
 from ..kernels import eager
-from ..runs.compiled import stepper_options
 from ..runs.events import WAIT, Events
 from ..runs.integrate import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO
+from ..runs.run_arguments import stepper_options
 from ..runs.simulate import simulate
 from ..storage import BROKEN, read_arrays, sealed
-from .starts import UNASSEMBLED, assemble_states
-from .variations import Variations
+from .variations import UNASSEMBLED, Variations, assemble_states
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel

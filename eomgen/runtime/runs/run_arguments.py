@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike
 from ...base import algebra
 from ...base.algebra import Array
 from ...base.limits.constraints import ALIKE
-from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL, SUNK
+from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL, SCIPY_ATOL, SCIPY_RTOL, SUNK
 from ...base.texts import shown
 from ...errors import (
     AssemblyError,
     EvaluationError,
     calls_within,
+    cannot,
     ill_shaped,
     ill_typed,
     incomplete,
@@ -26,12 +27,21 @@ from ...errors import (
     no_number,
     off_range,
 )
-from ..argument_checks import as_real, read_flag, read_number, read_numbers, read_times, require_steps, unknown
+from ..argument_checks import (
+    as_real,
+    check_names,
+    read_flag,
+    read_number,
+    read_numbers,
+    read_times,
+    require_steps,
+    unknown,
+)
 from ..initial import Initial
 from ..inputs import Forcing
 from ..trajectory import Span, Start, last_state
 from .events import at_next_samples, is_inner_run
-from .integrate import NAMES
+from .integrate import NAMES, require_one
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
@@ -145,6 +155,49 @@ def check_step(name: str, raw: Any) -> float:
     if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
         raise off_range(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {raw}")
     return value
+
+
+# -- the module's own steppers -----------------------------------------------------------------------------------------
+
+
+STEPS = ("rtol", "atol", "max_step", "first_step")
+
+
+def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
+    """Whether a run needs nothing but the module's own steppers."""
+    core: Any = module.core
+    there = isinstance(method, str) and method in core.methods
+    if isinstance(method, str) and method == "Taylor":
+        if not there:
+            raise cannot(no_series(module))
+        if not forcing.stepwise:
+            raise cannot(
+                "method Taylor takes only inputs that are constant between corners: numbers, and tables with "
+                'interpolation "zero-order"; for other inputs use DOP853'
+            )
+    return there and not forcing.foreign
+
+
+def no_series(module: BoundModel) -> str:
+    """Why a module has no Taylor method."""
+    why = module.info.no_series
+    return (
+        f"{module.name} has no Taylor series: {why}; the method works for open chains of bodies whose equations are "
+        "smooth and not too long; use DOP853"
+    )
+
+
+def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:
+    """Tolerances and step limits as steppers of n states take them, or a UsageError for an option that cannot be.
+
+    The span (s) is the longest first step; ``checked`` options have been checked and completed already.
+    """
+    check_names("option of simulate", options, STEPS)
+    raw = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
+    limits = {"max_step": raw.get("max_step", inf), "first_step": raw.get("first_step", 0.0)}
+    atol = np.empty(n)
+    atol[:] = raw["atol"]
+    return {"rtol": require_one(raw["rtol"]), "atol": atol, **limits}
 
 
 # -- span, times, method, first state ----------------------------------------------------------------------------------

@@ -17,7 +17,6 @@ from ..inputs import Forcing
 from ..refusals import not_driven, require_rigid_contacts
 from ..trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
-from .compiled import can_run
 from .events import WAIT, ControlledEvents, Events, inner_run, is_inner_run
 from .integrate import (
     Solution,
@@ -31,6 +30,7 @@ from .integrate import (
 )
 from .run_arguments import (
     IMPLICIT,
+    can_run,
     check_first_step,
     check_method,
     check_tolerances,
