@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 PATIENCE = 2.0  #: seconds before anything is shown
 EVERY = 0.2  #: seconds between updates
 STRIDE = 64  #: calls between looks at the clock
+WIDTH = 72  #: characters of a line
 
 
 _terminal: list[Any] = [None, False]  #: stderr at the last run, and whether it is a terminal
@@ -56,10 +57,8 @@ class Progress:
         self.start, self.length = start, end - start
         self.next = perf_counter() + patience
         self.calls = 0
-        self.bar: Any = None
-        self.task: Any = None
-        self.page: Any = None
-        self.plain = False
+        self.page: Any = None  #: where a notebook shows it
+        self.open = False
 
     def __call__(self, t: float) -> None:
         """Tell that the integrator is at time t."""
@@ -73,41 +72,21 @@ class Progress:
         if now < self.next:
             return
         self.next = now + EVERY
-        part = min(max((t - self.start) / self.length, 0.0), 1.0) if self.length else 1.0
-        if self.bar is None and self.page is None and not self.plain:
-            self._open()
-        if self.plain:
-            sys.stderr.write(f"\rsimulating: {100 * part:3.0f} %  {self.form.format(t)} ")
-            sys.stderr.flush()
-        elif self.page is not None:
-            self.page.update(_Bar(part, self.form.format(t)))
+        bar = _Bar(min(max((t - self.start) / self.length, 0.0), 1.0) if self.length else 1.0, self.form.format(t))
+        if not self.open and in_notebook():
+            self.page = sys.modules["IPython"].display.display(bar, display_id=True)
+        self.open = True
+        if self.page is not None:
+            self.page.update(bar)
         else:
-            self.bar.update(self.task, completed=part, description=self.form.format(t))
+            print(f"\r{bar} ", end="", file=sys.stderr, flush=True)
 
     def close(self) -> None:
         """Clean up."""
         if self.page is not None:
             self.page.update(_Bar(None, ""))
-        elif self.bar is not None:
-            self.bar.stop()
-        elif self.plain:
-            sys.stderr.write("\r" + " " * 40 + "\r")
-            sys.stderr.flush()
-
-    def _open(self) -> None:
-        if in_notebook():
-            self.page = sys.modules["IPython"].display.display(_Bar(0.0, ""), display_id=True)
-            if self.page is not None:
-                return
-        try:
-            from rich.console import Console
-            from rich.progress import Progress as Bar
-        except ImportError:
-            self.plain = True
-            return
-        self.bar = Bar(console=Console(stderr=True), transient=True)
-        self.task = self.bar.add_task("simulating", total=1.0)
-        self.bar.start()
+        elif self.open:
+            print("\r" + " " * WIDTH + "\r", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager
@@ -124,13 +103,15 @@ def waiting(what: str) -> Iterator[None]:
 
 
 class _Bar:
-    """A bar as notebooks show it; nothing without a part."""
+    """A bar as terminals and notebooks show it; nothing without a part."""
 
     def __init__(self, part: float | None, form: str) -> None:
         self.part, self.form = part, form
 
     def __repr__(self) -> str:
-        return "" if self.part is None else f"simulating: {100 * self.part:3.0f} %  {self.form}"
+        if self.part is None:
+            return ""
+        return f"simulating [{'#' * round(24 * self.part):<24}] {100 * self.part:3.0f} %  {self.form}"
 
     def _repr_html_(self) -> str:
         if self.part is None:
