@@ -100,12 +100,16 @@ class Events:
 
     Parameters
     ----------
-    given : None, or one event or several: names, texts, functions; a mapping names them
+    raw : None, or one event or several: names, texts, functions; a mapping names them
         None watches all of the model.  Those of the model that reset the state are watched always.
+    controllers : mapping of str to callable, optional
+        Functions f(t, x) that give the new values of sampled states without a law, by name.
     """
 
-    def __init__(self, layout: Layout, raw: Any) -> None:
+    def __init__(self, layout: Layout, raw: Any, controllers: Mapping[str, Any] | None = None) -> None:
         self.layout = layout
+        #: by the event at which they act, in the order of renewal
+        self.controllers = {} if controllers is None else _by_event(layout, controllers)
         self.declared = layout.info.events
         self.over = False  #: whether the last reset ended the run
         self.names, self.last = list[str](), ""  #: last: the event whose new state is asked for, as messages name it
@@ -124,13 +128,15 @@ class Events:
             else:
                 self.functions.append(RunEvent(one, name or ""))
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
+        for i in self.controllers:
+            self.model[i].action = WAIT  # compiled loops ask Python there
         taken: dict[str, int] = {}
         for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
             taken[name] = taken.get(name, 0) + 1
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
-        if any(event.action == WAIT for event in self.model):
+        if any(event.action == WAIT for i, event in enumerate(self.model) if i not in self.controllers):
             from ..impacts.impact import strike_events
 
             self._strike = strike_events
@@ -168,10 +174,12 @@ class Events:
         """The state after the events that happened at time t."""
         after = np.array(x, dtype=float)
         for i in fired:
-            if self.model[i].action == RESET:
+            if self.model[i].action == RESET or i in self.controllers:
                 after = self.renewed(module, forcing, t, after, i)
+                for control in self.controllers.get(i, ()):
+                    after[control.place] = control(t, after)
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
-        gaps = [i for i in fired if self.model[i].action == WAIT]
+        gaps = [i for i in fired if self.model[i].action == WAIT and i not in self.controllers]
         if gaps:
             self.last = f" at event {', '.join(self.names[i] for i in gaps)}"
             after = self._strike(module, t, after, self.declared, gaps, forcing)
@@ -424,36 +432,8 @@ class Controller:
         return float(result)
 
 
-class ControlledEvents(Events):
-    """The events of a run in which functions f(t, x) give the new values of sampled states, by name.
-
-    Refuses a name that is no sampled state without a law, and what is no function f(t, x).
-    """
-
-    def __init__(self, layout: Layout, raw: Any, controllers: Any) -> None:
-        result = _by_event(layout, controllers)
-        super().__init__(layout, raw)
-        self.controllers = result
-        for i in result:
-            self.model[i].action = WAIT  # compiled loops ask Python there
-
-    def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
-        """The state after the events that happened at time t."""
-        gaps = [i for i in fired if self.model[i].action == WAIT and i not in self.controllers]
-        after = np.array(x, dtype=float)
-        for i in (i for i in fired if i not in gaps):
-            if i not in self.controllers:
-                after = super().reset(module, forcing, t, after, [i])
-                continue
-            after = self.renewed(module, forcing, t, after, i)
-            for control in self.controllers[i]:
-                after[control.place] = control(t, after)
-            after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
-        return super().reset(module, forcing, t, after, gaps)
-
-
 def _by_event(layout: Layout, raw: Any) -> dict[int, list[Controller]]:
-    """Controllers by the event at which they act, in the order of renewal."""
+    """Controllers by event; refuses a name of no sampled state without a law, and what is no function f(t, x)."""
     require_mapping("controllers", raw)
     wanted: Mapping[str, Any] = without_dots(raw, layout.instances)
     clocks = layout.info.clocks

@@ -17,7 +17,7 @@ from ..inputs import Forcing
 from ..refusals import not_driven, require_rigid_contacts
 from ..trajectory import Span, Start
 from .bound_run import Crawling, Run, watch_run
-from .events import WAIT, ControlledEvents, Events, inner_run, is_inner_run
+from .events import WAIT, Events, inner_run, is_inner_run
 from .integrate import (
     Solution,
     check_options,
@@ -91,9 +91,7 @@ def plan_run(
     """Read the method, its tolerances and steps (``limits``) and options, inputs and events of a run."""
     size, declared, layout = check_method(method, step), declare(module), module.layout
     method = declared["method"] if method is None else method
-    watched = events if isinstance(events, Events) else Events(layout, events)
-    if controllers is not None:
-        watched = ControlledEvents(layout, events, controllers)
+    watched = events if isinstance(events, Events) else Events(layout, events, controllers)
     forcing = Forcing(layout, inputs)
     compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:
