@@ -220,7 +220,7 @@ def keywords() -> Iterator[str]:
     shown = {"module", "file", "format"}
     for known, those in {
         "BuildOptions": arguments("toolchain.compiler", "Options"),
-        "StepOptions": bound | set(import_module("eomgen.runtime.ensembles.simulate_many").OPTIONS),
+        "StepOptions": bound | set(import_module("eomgen.runtime.runs.run_arguments").STEPS),
         "ReducedOptions": bound | set(import_module("eomgen.analysis.sensitivities").OPTIONS),
         "RobotKeywords": arguments("importers", "RobotOptions", "check_inertia"),
         "LoadOptions": arguments("api.loading", "load", "path", "robot") | robot,

@@ -26,7 +26,7 @@ from ..plotting import printed_names
 from ..refusals import refuse_moreau, require_support
 from ..runs.bound_run import Progress, wanted
 from ..runs.events import require_forward
-from ..runs.run_arguments import can_run, declare, declared_step, find_span, ordered_times, steps_of
+from ..runs.run_arguments import STEPS, can_run, declare, declared_step, find_span, ordered_times, steps_of
 from ..runs.simulate import simulate
 from ..storage import attributes, free, table_path
 from ..trajectory import Span
@@ -474,7 +474,6 @@ class Ensemble(Result):
 
 STORED = 64  #: blocks at least that a store keeps of a large ensemble
 WIDEST = 8  #: runs side by side in one thread, at most
-OPTIONS = ("rtol", "atol", "max_step", "first_step")
 
 
 def simulate_many(
@@ -561,7 +560,7 @@ def simulate_many(
         dask.distributed is not installed.
     """
     require_support(module.layout, "simulate_many")
-    check_names("option of simulate_many", options, OPTIONS)
+    check_names("option of simulate_many", options, STEPS)
     if grid is not None:
         initial, parameters, inputs = spread_grid(module, grid, (initial, parameters, inputs))
     tables, constants = _separate(module.layout, inputs)
