@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -460,13 +460,17 @@ def warn_of_fixed(layout: Layout, p: Array, names: Iterable[str]) -> None:
 
 
 @contextmanager
-def silent() -> Iterator[None]:
-    """Within it :func:`warn_of_fixed` is silent: starts of many runs, of which the call that runs them told once."""
-    token = _SILENT.set(True)
+def within(flag: ContextVar[bool]) -> Iterator[None]:
+    """A context, in this thread, in which a flag is set."""
+    token = flag.set(True)
     try:
         yield
     finally:
-        _SILENT.reset(token)
+        flag.reset(token)
+
+
+#: Within it :func:`warn_of_fixed` is silent: starts of many runs, of which the call that runs them warned once.
+silent = partial(within, _SILENT)
 
 
 def values_at(layout: Layout, p: Array) -> dict[str, Any]:

@@ -242,7 +242,7 @@ def _refused(module: BoundModel, p: Array) -> dict[int, str]:
     problems = refused_runs(module.info, columns)
     if problems and len(problems) == columns.shape[1]:
         raise ParameterError(problems[0])
-    return {k: str(ParameterError(one)) for k, one in problems.items()}
+    return {k: "; ".join(map(str, one)) for k, one in problems.items()}
 
 
 def _require_one_length(lengths: Mapping[str, int]) -> None:

@@ -11,9 +11,9 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
+from functools import partial
 from math import ceil, isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ from ...errors import (
 )
 from ..argument_checks import as_real, check_names, require_mapping, require_time_and_state, without_dots
 from ..inputs import read_text
-from ..layout import Layout
+from ..layout import Layout, within
 from ..refusals import require_switched
 from ..tapes import Expression, joined
 
@@ -266,14 +266,8 @@ def _times(name: str, raw: Any) -> int:
 _SILENT: ContextVar[bool] = ContextVar("events_silent", default=False)
 
 
-@contextmanager
-def inner_run() -> Iterator[None]:
-    """Within it :func:`warn_of_unknown` is silent: a run that is part of another call, which warns itself."""
-    token = _SILENT.set(True)
-    try:
-        yield
-    finally:
-        _SILENT.reset(token)
+#: Within it warnings of runs are silent: of a run that is part of another call, which warns itself.
+inner_run = partial(within, _SILENT)
 
 
 def is_inner_run() -> bool:
