@@ -369,7 +369,7 @@ def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
 
 def restore(kind: type[Any], name: str, file: str, p: Array, u: dict[str, float], lazy: Lazy | None = None) -> Any:
     """The module of a pickle, with the rarer kernels where they had been made."""
-    core: Any = _find_core(name, file)
+    core: Any = find_core(name, file)
     if lazy is None:
         return kind(core, p, u)
     names, made = lazy
@@ -378,7 +378,7 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: dict[str, float]
         if group not in made:
             rare = ", ".join(name for name in names if name not in core.names and str(NAMED[name].late) == group)
             raise cannot(f"the module was pickled without {rare}; call one of them before you pickle it")
-        return _find_core(*made[group])
+        return find_core(*made[group])
 
     return kind(LazyCore(core, names, load), p, u)
 
@@ -389,7 +389,8 @@ def _find_loaded(name: str) -> Any:
     return getattr(result, "model", result)
 
 
-def _find_core(name: str, file: str) -> Any:
+def find_core(name: str, file: str) -> Any:
+    """The core of a name: loaded already, of a generated package, or in its file in the cache."""
     if (loaded := _find_loaded(name)) is not None:
         return loaded
     try:

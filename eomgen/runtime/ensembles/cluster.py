@@ -17,7 +17,7 @@ from ...base.files import MANIFEST
 from ...base.value_rules import as_count
 from ...errors import MissingDependencyError, ToolchainError, UsageError, bad_file, cannot, ill_typed
 from ..argument_checks import require
-from ..kernels import eager, restore
+from ..kernels import eager, find_core
 from .block import LOST, MEANING, Custom, Kept, Plan, Reduction, RunBlock, Runs, keep, run_block
 from .variations import Variations
 
@@ -78,7 +78,7 @@ def _open(name: str, file: str, digest: str, recipe: str) -> Any:
     same = path.is_file() and _digest(path) == digest
     try:
         if not recipe:
-            return restore(_core, name, file, None, None) if same else import_module(name)  # type: ignore[arg-type]
+            return find_core(name, file) if same else import_module(name)
         build, load = (import_module(f"eomgen.toolchain.{part}") for part in ("build", "load"))
     except ImportError as error:
         if recipe:
@@ -90,13 +90,9 @@ def _open(name: str, file: str, digest: str, recipe: str) -> Any:
         ) from error
     how: dict[str, Any] = json.loads(recipe)
     if same and load.processor_features().issuperset(how["needs"]):
-        return restore(_core, name, file, None, None)  # type: ignore[arg-type]
+        return find_core(name, file)
     options = build.Options(**how["options"])
     return load.load_core(build.compile_sources("model", how["sources"], how["name"], options))
-
-
-def _core(core: Any, p: None, u: None) -> Any:
-    return core
 
 
 # -- the cluster -------------------------------------------------------------------------------------------------------
