@@ -20,6 +20,7 @@ from ...base.texts import TIME, html_table, label
 from ...base.value_rules import read_count
 from ...errors import UsageError, bad_data, cannot, ill_typed, no_choice, off_range, untrue
 from ..argument_checks import check_names, require, require_size, unknown, without_dots
+from ..failure import WORDS, place
 from ..identity import code_digest, digest, origin, plain, spell_input
 from ..inputs import Forcing, Signal, fill_rates, rate_pairs
 from ..plotting import printed_names
@@ -67,7 +68,6 @@ if TYPE_CHECKING:
 PANELS = 3  #: columns that a notebook draws
 ROWS = 12  #: columns whose numbers it lists
 FAILURES = 5  #: runs that it names
-NAMED = 6  #: values of a run that its failure names
 STATISTICS = ("count", "mean", "variance", "least", "greatest")
 #: Of each run, and what it is.
 COLUMNS_DOC = {
@@ -87,9 +87,8 @@ class Failure(NamedTuple):
     values: dict[str, float]  #: of what differs between the runs, as ``varied()`` calls it
 
     def __str__(self) -> str:
-        values = ", ".join(f"{name} = {x:.6g}" for name, x in [*self.values.items()][:NAMED])
-        more = ", ..." * (len(self.values) > NAMED)
-        return f"run {self.run}{f' ({values}{more})' * bool(values)} ended at t = {self.t:.6g} s: {self.message}"
+        values = place([*self.values], np.array([*self.values.values()])).removeprefix(", ")
+        return f"run {self.run}{f' ({values})' * bool(values)} ended at t = {self.t:.6g} s: {self.message}"
 
 
 class Ensemble(Result):
@@ -158,8 +157,6 @@ class Ensemble(Result):
         status, code = int(self.status[k]), int(self._failure[k])
         message = self._messages.get(k) or MEANING.get(status, f"status {status}")
         if code and k not in self._messages:
-            from ..failure import WORDS
-
             reason = WORDS.get(code, (f"status {code}",))[0]
             message += f"; last failure near t = {self._failure_time[k]:.6g} s: {reason}"
         return Failure(k, status, float(self.t_end[k]), message, {name: float(row[k]) for name, row in varied.items()})

@@ -31,6 +31,7 @@ from ...errors import (
 )
 from ..argument_checks import read_number, read_numbers
 from ..columns import Columns, Residuals, describe
+from ..failure import place
 from ..inputs import Forcing
 from ..refusals import not_driven
 from ..runs.events import Events
@@ -224,16 +225,16 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
         owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
         what = f"no finite value: {TO_BE_FINITE}"
         return f"beyond it, at t = {t:.6g} s, {', '.join(owners)} has {what}"
-    place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(driven.led, y, strict=True)) or f"t = {t:.6g} s"
+    where = place(driven.led, y)[2:] or f"t = {t:.6g} s"
     if not gaps.max() > CONTRADICTION:
-        return f"beyond it, at {place}, the loops close again: a driver's value jumps, or is out of reach in between"
+        return f"beyond it, at {where}, the loops close again: a driver's value jumps, or is out of reach in between"
     joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
     if joints and gaps[joints].max() > CONTRADICTION:  # rather than the driver
         worst = joints[int(np.argmax(gaps[joints]))]
     else:
         worst = int(np.argmax(gaps))
     unit = "m" if layout.info.constraint_kinds[worst] == "length" else "rad"
-    return f"beyond it, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
+    return f"beyond it, at {where}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
 
 
 # -- the analysis ------------------------------------------------------------------------------------------------------
@@ -282,10 +283,9 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     fine = initial.compatible(q, (), dict.fromkeys(names, 0.0))
     for name in names:
         if name not in fine:
-            place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
             raise PartitionError(
-                f"{name} cannot be prescribed from the initial position ({place}): the coordinate cannot move there, "
-                "or branches meet there; give a slightly different initial position",
+                f"{name} cannot be prescribed from the initial position ({place(layout.q, q)[2:]}): the coordinate "
+                "cannot move there, or branches meet there; give a slightly different initial position",
                 t,
                 q,
             )
@@ -299,9 +299,9 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     result = (*names, *held)
     Q = DrivenCoordinates(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
     if Q < SINGULAR:
-        place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
+        where = place(layout.q, q)[2:]
         raise PartitionError(
-            f"the initial position is singular ({place}): branches meet there; give a slightly different one", t, q
+            f"the initial position is singular ({where}): branches meet there; give a slightly different one", t, q
         )
     return result
 
