@@ -211,7 +211,8 @@ def collect_variations(
     require_size(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
-    varied = Variations(k, p, u, states, values, refused=_refused(module, p))
+    refused = {} if parameters is None else _refused(module, p)
+    varied = Variations(k, p, u, states, values, refused=refused)
     rows = varied.deciding(module.layout)
     differ = any(np.ndim(value) and name in module.layout.q for name, value in values.items())
     return replace(varied, starts_differ=bool(differ or (rows != rows[:, :1]).any()))
