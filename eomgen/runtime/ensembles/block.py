@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...base.algebra import Array
+from ...base.algebra import Array, Indices
 from ...base.files import as_path, open_plain, remove_parts, write_whole
 from ...base.texts import shown
 from ...errors import EomgenError, MissingDependencyError, UsageError, bad_data, bad_file, cannot, ill_typed, no_choice
@@ -27,14 +27,14 @@ from ..runs.integrate import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMAL
 from ..runs.run_arguments import stepper_options
 from ..runs.simulate import simulate
 from ..storage import BROKEN, read_arrays, sealed
-from .variations import UNASSEMBLED, Variations, assemble_states
+from .variations import Variations, assemble_states
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
 
 Integers = np.ndarray[Any, np.dtype[Any]]
 
-TOO_SMALL_STEP, TOO_MANY_STEPS, BAD_PARAMETERS, FAILED, LOST = -100, -104, -110, -112, -113
+TOO_SMALL_STEP, TOO_MANY_STEPS, BAD_PARAMETERS, UNASSEMBLED, FAILED, LOST = -100, -104, -110, -111, -112, -113
 EVENT = 1  #: SciPy's
 #: What a status means; 0 is the end of the span.
 MEANING = {
@@ -198,21 +198,17 @@ def run_block(runs: Runs, threads: int = 1, watch: Callable[[int], None] | None 
     """Run all of a block on threads, whose number changes no result; ``watch`` takes how many runs have ended."""
     varied, plan, count = runs.varied, runs.plan, runs.count
     if varied.refused:
-        good = np.array([k for k in range(count) if k not in varied.refused], dtype=np.intp)
+        good = _others(count, varied.refused)
         allowed = run_block(replace(runs, varied=varied.chosen(good, len(good), {})), threads, watch)
-        block = _spread(allowed, good, RunBlock.blank(runs, count, BAD_PARAMETERS))
-        block.texts.update(varied.refused)
-        return block
-    x0, failed, texts = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
+        return _spread(allowed, runs, varied.refused, BAD_PARAMETERS)
+    x0, reasons = assemble_states(runs.module, varied, plan.span[0], runs.forcing_of)
     core: Any = eager(runs.module.core)
     run = _run_compiled if plan.method in core.methods else _run_python
-    good = np.flatnonzero(~failed)
-    some: Any = good if good.size < count else slice(None)
+    some: Any = _others(count, reasons) if reasons else slice(None)
     p, u = (a if a.ndim == 1 else a[:, some].T for a in (varied.p, varied.u))
     block = run(runs, x0[:, some].T, p, u, threads, watch)
-    if good.size < count:
-        block = _spread(block, good, RunBlock.blank(runs, count, UNASSEMBLED))
-        block.texts.update(zip(np.flatnonzero(failed).tolist(), texts, strict=True))
+    if reasons:
+        block = _spread(block, runs, reasons, UNASSEMBLED)
     project(runs, block)
     return block
 
@@ -311,12 +307,18 @@ def _take_notes(notes: Array, t_events: list[Array], x_events: list[Array]) -> N
     notes[:, : len(order)] = result[:, order]
 
 
-def _spread(result: RunBlock, good: Integers, block: RunBlock) -> RunBlock:
-    """The block with the runs that could be begun in their places."""
+def _others(count: int, reasons: Mapping[int, str]) -> Indices:
+    """The runs that begin, of so many."""
+    return np.array([k for k in range(count) if k not in reasons], dtype=np.intp)
+
+
+def _spread(result: RunBlock, runs: Runs, reasons: dict[int, str], status: int) -> RunBlock:
+    """The block of all runs, with the result of those that began, and of the others the status and the reason."""
+    block, good = RunBlock.blank(runs, runs.count, status), _others(runs.count, reasons)
     for name, value in vars(result).items():
         if isinstance(value, np.ndarray):
             getattr(block, name)[..., good] = value
-    block.texts.update({int(good[k]): text for k, text in result.texts.items()})
+    block.texts.update(reasons | {int(good[k]): text for k, text in result.texts.items()})
     return block
 
 

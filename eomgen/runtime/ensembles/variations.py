@@ -284,15 +284,13 @@ def _floats(what: str, raw: Any) -> Array:
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-UNASSEMBLED = -111  #: status of a run whose initial values could not be assembled
-
 
 def assemble_states(
     module: BoundModel, varied: Variations, t: float, forcing_of: Callable[[int], Forcing]
-) -> tuple[Array, Mask, list[str]]:
-    """The initial states (n_x, k) of all runs on the constraints at time t, NaN where a run cannot be assembled.
+) -> tuple[Array, dict[int, str]]:
+    """The initial states (n_x, k) of all runs on the constraints at time t, and why some cannot be assembled (NaN).
 
-    Also which these are (k,), and why, for each of them in order.  ``forcing_of(k)`` has the inputs of a run.
+    ``forcing_of(k)`` has the inputs of a run.
     """
     with silent():  # for all runs, when their values were collected
         x, reasons = _assemble_all(module, varied, t, forcing_of)
@@ -301,8 +299,7 @@ def assemble_states(
             x[:, k] = at_next_samples(module.bind(**varied.column(k)), t, x[:, k])
     if module.layout.switches:
         _refuse_disagreement(module, varied, t, x, reasons)
-    failed = np.array([k in reasons for k in range(varied.count)], dtype=bool)
-    return x, failed, [reasons[k] for k in sorted(reasons)]
+    return x, reasons
 
 
 def _refuse_disagreement(module: BoundModel, varied: Variations, t: float, x: Array, reasons: dict[int, str]) -> None:
