@@ -218,7 +218,7 @@ def _run_compiled(runs: Runs, x0: Array, p: Array, u: Array, threads: int, watch
     core: Any = eager(module.core)
     forcing.attach(module)
     nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
-    settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
+    settings = stepper_options(module.n_x, plan.options)
     ensemble = core.ensemble(
         plan.method, nodes, x0, p, u, max_steps=plan.max_steps, t_eval=plan.t_eval,
         signals=forcing.encode(), events=runs.events.encode(), keep=plan.keep_events, **settings,

@@ -31,6 +31,7 @@ from .events import Events
 from .integrate import RESET_FAILED, TOO_SMALL, choose_solver
 from .run_arguments import (
     IMPLICIT,
+    STEPS,
     can_run,
     check_method,
     check_tolerances,
@@ -100,7 +101,7 @@ class Integrator:
         self._evaluations = 0
         self._compiled: Any = None
         if can_run(module, method, Forcing(module.layout, None)):
-            settings = stepper_options(module.n_x, np.inf, self._options, checked=True)
+            settings = stepper_options(module.n_x, self._options)
             if step is not None:
                 settings["first_step"] = self._step
             plan = {"nodes": [1.0], "t_eval": [], "dense": False, "events": None, "watch": None}
@@ -302,7 +303,8 @@ def solver_class(core: Any, name: str) -> Any:
             for key in IMPLICIT if name == "Radau" else ():  # the model's own Jacobian, or none
                 extraneous.pop(key, None)
             options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
-            settings = stepper_options(self.n, abs(t_bound - t0), options)
+            check_names("option of simulate", options, STEPS)
+            settings = stepper_options(self.n, check_tolerances(self.n, abs(t_bound - t0), options))
             self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
 
         nfev = _count("evaluations", "Evaluations of the right-hand side so far.")

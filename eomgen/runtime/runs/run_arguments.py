@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...base import algebra
 from ...base.algebra import Array
 from ...base.limits.constraints import ALIKE
-from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL, SCIPY_ATOL, SCIPY_RTOL, SUNK
+from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL, SUNK
 from ...base.texts import shown
 from ...errors import (
     AssemblyError,
@@ -29,7 +29,6 @@ from ...errors import (
 )
 from ..argument_checks import (
     as_real,
-    check_names,
     read_flag,
     read_number,
     read_numbers,
@@ -187,17 +186,12 @@ def no_series(module: BoundModel) -> str:
     )
 
 
-def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:
-    """Tolerances and step limits as steppers of n states take them, or a UsageError for an option that cannot be.
-
-    The span (s) is the longest first step; ``checked`` options have been checked and completed already.
-    """
-    check_names("option of simulate", options, STEPS)
-    raw = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
-    limits = {"max_step": raw.get("max_step", inf), "first_step": raw.get("first_step", 0.0)}
+def stepper_options(n: int, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Checked tolerances and limits of steps as steppers of n states take them."""
+    limits = {"max_step": options.get("max_step", inf), "first_step": options.get("first_step", 0.0)}
     atol = np.empty(n)
-    atol[:] = raw["atol"]
-    return {"rtol": require_one(raw["rtol"]), "atol": atol, **limits}
+    atol[:] = options["atol"]
+    return {"rtol": require_one(options["rtol"]), "atol": atol, **limits}
 
 
 # -- span, times, method, first state ----------------------------------------------------------------------------------
