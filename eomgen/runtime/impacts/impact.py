@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,13 +51,7 @@ class Gaps:
         self.outputs = [(i, layout.y.index(n)) for i, n in enumerate(names) if n not in layout.q + layout.loops]
         self.loops = [(i, layout.loops.index(n)) for i, n in enumerate(names) if n in layout.loops]
         self.tree = [(i, layout.q.index(n)) for i, n in enumerate(names) if n in layout.q]
-
-        self._kernels: dict[str, Any] = {}
-
-    def _kernel(self, name: str) -> Any:
-        if name not in self._kernels:
-            self._kernels[name] = self.module.kernels.kernel(name)
-        return self._kernels[name]
+        self._kernel = cache(module.kernels.kernel)
 
     def inputs(self, t: float, x: Array) -> Array | None:
         """u (n_u,) at a state; None for the module's own."""
@@ -107,9 +102,7 @@ class Gaps:
         v = x[self.layout.n_q :]
         rates = rows @ v
         if self.outputs:
-            u, each = self.inputs(t, x), Gaps(self.module, self.names)
-            if u is not None:
-                each.module = self.module.bind(None, u)
+            each = Gaps(self.module.bind(None, self.inputs(t, x)), self.names)  # with inputs that stand still
             rates += drift(lambda time: each.values(time, x), t)
             for i, j in self.outputs if self.layout.n_u else ():
                 rates[i] += self._pushed(t, x, j)
