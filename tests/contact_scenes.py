@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 import eomgen as eg
 
@@ -39,6 +41,15 @@ def placed(q: Sequence[float], points: Any) -> np.ndarray:
     """Points of a body at x, y, angle."""
     c, s = np.cos(q[2]), np.sin(q[2])
     return np.asarray(points, dtype=float) @ np.array([[c, s], [-s, c]]) + np.asarray(q[:2])
+
+
+def momenta(masses: np.ndarray, inertias: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, float]:
+    """Of bodies in the plane, and about the origin, of columns of states; and a measure of what takes part."""
+    n = len(masses)
+    q, v = x[: 3 * n].reshape(n, 3, -1), x[3 * n :].reshape(n, 3, -1)
+    p = masses[:, None, None] * v[:, :2]
+    spin = q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0] + inertias[:, None] * v[:, 2]
+    return np.vstack([p.sum(axis=0), spin.sum(axis=0)]), float(np.abs(p).max() + np.abs(spin).max())
 
 
 def to_segment(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
@@ -162,6 +173,110 @@ def near(mod: eg.Module, q: np.ndarray) -> list[Record]:
         kinds = (other, one) if swapped else (one, other)
         found.append(Record(kinds, -row[2:5] if swapped else row[2:5], row[5], row[6:9]))
     return found
+
+
+# -- curves of profiles and outlines, by their descriptions; SciPy finds the nearest point -----------------------------
+
+
+class Piece(NamedTuple):
+    """A circular arc or a straight line between two points, by its direction at the first."""
+
+    start: np.ndarray
+    reach: np.ndarray
+    way: np.ndarray
+
+    def at(self, s: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Points and directions at parts of the length: rows."""
+        s = np.asarray(s, dtype=float)
+        turn = np.arctan2(cross(self.way, self.reach), self.way @ self.reach)
+        size = np.linalg.norm(self.reach) * s * np.sinc(s * turn / np.pi) / np.sinc(turn / np.pi)
+        return self.start + size[..., None] * turned_by(self.way, s * turn), turned_by(self.way, 2.0 * s * turn)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> Any:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def turned_by(way: np.ndarray, angle: Any) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * way[0] - s * way[1], s * way[0] + c * way[1]], axis=-1)
+
+
+def straight(points: Sequence[Any]) -> list[Piece]:
+    ends = np.asarray(points, dtype=float)
+    return [Piece(a, b - a, (b - a) / np.linalg.norm(b - a)) for a, b in pairwise(ends)]
+
+
+def smooth(points: Sequence[Any], closed: bool) -> list[Piece]:
+    """Biarcs of equal tangents, along the circles through three points; straight lines beyond open ends."""
+    p = np.asarray(points, dtype=float)
+    p = np.concatenate([p[-1:], p, p[:2]]) if closed else p
+    ways = []
+    for a, b, c in zip(p, p[1:], p[2:], strict=False):
+        centre = np.linalg.solve(2.0 * np.array([b - a, c - b]), [b @ b - a @ a, c @ c - b @ b])
+        out = turned_by(b - centre, np.pi / 2) / np.linalg.norm(b - centre)
+        ways.append(out * np.sign(out @ (c - a)))
+    if closed:
+        p = p[1:-1]
+    else:
+        mirrored = [
+            2.0 * (way @ v) / (v @ v) * v - way for way, v in ((ways[0], p[1] - p[0]), (ways[-1], p[-1] - p[-2]))
+        ]
+        ways = [mirrored[0], *ways, mirrored[1]]
+    result = []
+    for (a, b), (s, t) in zip(pairwise(p), pairwise(ways), strict=True):
+        v, bend = b - a, 2.0 * (1.0 - s @ t)
+        d = max(np.roots([bend, 2.0 * v @ (s + t), -v @ v]).real)
+        joint = 0.5 * (a + b + d * (s - t))
+        back = Piece(b, joint - b, -t)
+        result += [Piece(a, joint - a, s), Piece(joint, b - joint, -back.at(1.0)[1])]
+    rays = (
+        () if closed else (Piece(p[0] - 9.0 * ways[0], 9.0 * ways[0], ways[0]), Piece(p[-1], 9.0 * ways[-1], ways[-1]))
+    )
+    return [*rays[:1], *result, *rays[1:]]
+
+
+def nearest_on(pieces: Sequence[Piece], c: np.ndarray, closed: bool) -> tuple[float, np.ndarray]:
+    """The signed distance of a point from a curve that has its solid to the right, and the nearest point."""
+    best: tuple[float, int, float] = (np.inf, 0, 0.0)
+    grid = np.linspace(0.0, 1.0, 33)
+    for k, piece in enumerate(pieces):
+        points, ways = piece.at(grid)
+        slopes = ((points - c) * ways).sum(axis=1)
+        feet = [0.0, 1.0]
+        for i in np.flatnonzero((slopes[:-1] < 0.0) & (slopes[1:] > 0.0)):
+            feet.append(
+                brentq(lambda s, p=piece: float((p.at(s)[0] - c) @ p.at(s)[1]), grid[i], grid[i + 1], xtol=1e-16)
+            )
+        best = min(best, *((float(np.linalg.norm(piece.at(s)[0] - c)), k, s) for s in feet))
+    distance, k, s = best
+    point, way = pieces[k].at(s)
+    other = k + (1 if s == 1.0 else -1 if s == 0.0 else 0)
+    if closed or 0 <= other < len(pieces):  # at a corner the sum of both directions tells the side
+        way = way + pieces[other % len(pieces)].at(1.0 if other < k else 0.0)[1] * (other != k)
+    return distance * (1.0 if cross(way, c - point) > 0.0 else -1.0), point
+
+
+def check_nearest(
+    mod: eg.Module,
+    q: np.ndarray,
+    radius: float,
+    pieces: Sequence[Piece],
+    c: np.ndarray,
+    closed: bool,
+    turn: float = 0.0,
+) -> float:
+    """The deepest place of a circle about a point of the axes of a curve, which are turned: gap, normal and middle."""
+    gap, _ = nearest_on(pieces, c, closed)
+    corner = min(float(np.linalg.norm(piece.start - c)) for piece in pieces)
+    limit = max(1e-9, 4.0 * corner) if corner < 3e-8 else 1e-9  # where pieces share a circle
+    one = max(near(mod, q), key=lambda record: record.depth)
+    assert abs(one.depth - radius + gap) < limit
+    normal, arm = (turned_by(x, -turn) for x in (-one.normal[:2], one.middle[:2] - q[:2]))
+    assert abs(np.linalg.norm(normal) - 1.0) < 1e-12
+    assert abs(nearest_on(pieces, c - gap * normal, closed)[0]) < limit
+    assert np.abs(arm + (radius - 0.5 * one.depth) * normal).max() < 1e-9
+    return gap
 
 
 # -- a ball shot at a fixed shape: it flies on a known parabola, so that geometry alone says whether it touches --------

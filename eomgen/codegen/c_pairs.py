@@ -158,6 +158,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
                 "first": tables[kind.first],
                 "second": tables[kind.second],
                 "planar": kind.extent,
+                "thin": kind.thin,
                 "lines": kind.lines,
                 "law": kind.law,
                 "states": kind.states,

@@ -122,7 +122,7 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
             if len(kind.corners) == 1:
                 name = f"nearest({name}, {kind.corners[0]}{sloped})"
             names.append(f"facing({name}, {kind.corners!r}{sloped})" if len(kind.corners) > 1 else name)
-        row = (kind.first, kind.second, kind.extent, kind.law)
+        row = (kind.first, kind.second, kind.extent, kind.thin, kind.law)
         kinds.append(f"        ({', '.join([*map(repr, row), *names, *map(repr, kind.beside)])}),\n")
     tables = "".join(f"        {table!r},\n" for table in function.tables)
     listed = f"(\n{tables}    ),\n    (\n{''.join(kinds)}    ),"

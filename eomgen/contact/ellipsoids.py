@@ -182,7 +182,7 @@ class EllipsoidRod(EllipsoidRound):
     convex body is convex, so that the nearest point of the whole line, held between the ends, is the nearest.  That of
     the line is found across it, where the ellipsoid is an ellipse, by the normal n that makes n r - sqrt(n B n)
     greatest, r from the centre to the line, B = R diag(a^2, b^2, c^2) R^T.  Of a line deep in a slim ellipsoid that may
-    be another, so that the point nearest to the centre counts where it is nearer.
+    be another, so that the point in the least of all ellipsoids of this form counts where it is nearer.
     """
 
     half: Expr
@@ -205,9 +205,11 @@ class EllipsoidRod(EllipsoidRound):
         bxx, bxy, byy = form(across[0], across[0]), form(across[0], across[1]), form(across[1], across[1])
         nx, ny, h = silhouette_normal(view, r, (bxx, bxy, byy))
         n = vec.add(vec.scale(nx, across[0]), vec.scale(ny, across[1]))
-        to_centre = -vec.dot(along, place)
+        scaled = [x / q for x, q in zip(along, squares, strict=True)]
+        in_least = -sum((x * p for x, p in zip(scaled, place, strict=True)), graph.zero)
+        in_least = in_least / sum((x * y for x, y in zip(scaled, along, strict=True)), graph.zero)
         both: list[list[Expr]] = []
-        for x in (to_centre + form(along, n) / h, to_centre):
+        for x in (form(along, n) / h - vec.dot(along, place), in_least):
             s = graph.apply("max", -self.half, graph.apply("min", self.half, x))
             outward, gap = nearest(view, self.axes, vec.add(place, vec.scale(s, along)))
             both.append([gap, s, *outward])
@@ -273,11 +275,10 @@ class EllipsoidEllipsoid(Contact):
         apart = graph.apply("lt", 0.0, vec.dot(reach, reach))
         x, y, z = (where(apart, a, b) for a, b in zip(reach, along_axis(view, self.first, 0), strict=True))
         n = self._begin(forms, (x, y, z))
-        for k in range(COMMON):
-            if k == COMMON - 1:
-                x, y, z = n
-                n = settled(view, x), settled(view, y), settled(view, z)
-            n = self._step(forms, reach, n)
+        for _ in range(COMMON - 1):
+            n = self._rising_step(forms, reach, n)
+        x, y, z = n
+        n = self._step(forms, reach, (settled(view, x), settled(view, y), settled(view, z)))[0]
         own, other = (vec.times(B, n) for B in forms)
         return n, (sqrt(vec.dot(n, own)), sqrt(vec.dot(n, other))), (own, other, reach)
 
@@ -293,8 +294,24 @@ class EllipsoidEllipsoid(Contact):
         size = sqrt(x * x + y * y + z * z)
         return x / size, y / size, z / size
 
+    def _rising_step(self, forms: list[Mat3], reach: Vec3, n: Vec3) -> Vec3:
+        """A step; a half or a quarter of one that is so long that the gap gets less, where it is less less."""
+        graph = reach[0].graph
+        best, before = self._step(forms, reach, n)
+        way, most = vec.sub(best, n), _gap(forms, reach, best)
+        falls = graph.apply("lt", most, before)
+        for part in (0.5, 0.25):
+            tried = direction(vec.add(n, vec.scale(part * graph.one, way)), n)[0]
+            gap = _gap(forms, reach, tried)
+            better = graph.apply("and", falls, graph.apply("lt", most, gap))
+            most = where(better, gap, most)
+            x, y, z = (where(better, a, b) for a, b in zip(tried, best, strict=True))
+            best = (x, y, z)
+        return best
+
     @staticmethod
-    def _step(forms: list[Mat3], reach: Vec3, n: Vec3) -> Vec3:
+    def _step(forms: list[Mat3], reach: Vec3, n: Vec3) -> tuple[Vec3, Expr]:
+        """Newton's step towards the normal of the greatest gap, and the gap along n."""
         graph = reach[0].graph
         bend = _outer(graph.one, n)
         gap = reach
@@ -313,7 +330,12 @@ class EllipsoidEllipsoid(Contact):
         trace = whole[0][0] + whole[1][1] + whole[2][2] - 1.0
         good = graph.apply("and", graph.apply("lt", _TOO_BENT * det0, det), graph.apply("lt", 0.0, trace))
         x, y, z = (a + where(good, p, q) / where(good, det, det0) for a, p, q in zip(n, way, plain, strict=True))
-        return direction((x, y, z), n)[0]
+        return direction((x, y, z), n)[0], rise
+
+
+def _gap(forms: list[Mat3], reach: Vec3, n: Vec3) -> Expr:
+    """How far two ellipsoids are apart along a direction."""
+    return reduce(lambda gap, B: gap - sqrt(vec.dot(n, vec.times(B, n))), forms, vec.dot(n, reach))
 
 
 # -- cuboids -----------------------------------------------------------------------------------------------------------

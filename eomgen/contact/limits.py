@@ -22,6 +22,9 @@ EVEN = 1e-9
 ROOM = 0.9
 #: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
 NOWHERE = 1e100
+#: Times the depth of a profile down to which forces are undefined: stages of DOP853 and RK45 are at most 2.7 times as
+#: far in a step as those before them, so that one of a step over 1 to 3 depths lies there.
+BELOW = 3.0
 #: Shear displacement by K below which (1 - exp(-x)) / x is its series to x^4: the next term, x^5 / 720, is 1e-18, where
 #: the quotient's slope begins to lose 1e-16 / x^2.
 SHORT_WAY = 1e-3
@@ -63,10 +66,10 @@ FOLLOWED = 0.005
 #: the stiffness of that place has no limit.  Measured up to here on 4,800 random pairs each with known normals and half
 #: axes of up to 10 : 1: depths are right to 1e-9 in all.
 UNIQUE = 0.95
-#: Steps of Newton's method for the common normal of two ellipsoids, and before these towards the normal at which
-#: ellipsoids scaled by one factor touch: each of these squares the distance less than it halves it, and Newton's method
-#: needs a start within some degrees.  Measured as above; after 6 steps before it the normal was another in 3 of 4,800.
-COMMON, TWICE = 12, 10
+#: Steps of Newton's method for the common normal of two ellipsoids, of which long ones go back to a half or a quarter,
+#: and before these towards the normal at which ellipsoids scaled by one factor touch.  Measured on 68,000 random pairs
+#: up to UNIQUE, half axes of 10 : 1 : 1 among them: all depths are right to 1e-9; with 14 and 2 those of all but one.
+COMMON, TWICE = 15, 3
 #: Square of the part of the size of two ellipsoids by which their deepest points may lie beside their common normal:
 #: depths have errors of about this square.
 ASIDE = 1e-8

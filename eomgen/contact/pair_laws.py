@@ -25,7 +25,7 @@ from .pairs import PairKind
 from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, EdgeRound, HollowArcRound, InnerCornerRound, InsideRound, ProfilePiece
-from .rounds import AtHeight, BlockRound, EdgeRod, PolygonRound, RodCorner, RodRod, RoundRound, SegmentRound
+from .rounds import AtHeight, BlockRound, EdgeEdge, EdgeRod, PolygonRound, RodCorner, RodRod, RoundRound, SegmentRound
 from .shapes import WHOLE_PLATE, greatest
 from .soil_beds import SoilCell
 from .soil_wheels import SoilWheel
@@ -48,6 +48,7 @@ class Given(NamedTuple):
     witness: int  #: which of several places of contact it is
     field: Any  #: of a height field alone
     height: Callable[[], Vec3] | None  #: from the plane of the first to the second, of shapes of the plane
+    ground: bool  #: whether the first is a piece of a profile
 
 
 Make = Callable[[Given], Contact]
@@ -57,12 +58,12 @@ def _each(first: str, second: Sequence[str], make: Make) -> dict[tuple[str, str]
     return {(first, one): make for one in second}
 
 
-def _on_segment(kind: type[SegmentRound]) -> Make:
-    return lambda g: kind(*g.laws, g.first[0], (g.first[1], g.radius))
+def _on_segment(g: Given) -> Contact:
+    return SegmentRound(*g.laws, g.first[0], (g.first[1], g.radius))
 
 
-def _two_rods(kind: type[RodRod]) -> Make:
-    return lambda g: kind(*g.laws, (g.first[0], g.second[0]), (g.first[1], g.second[1]))
+def _two_rods(g: Given) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]]:
+    return (g.first[0], g.second[0]), (g.first[1], g.second[1])
 
 
 def _on_block(g: Given) -> Contact:
@@ -70,8 +71,8 @@ def _on_block(g: Given) -> Contact:
     return BlockRound(*g.laws, (x, y, z), edge, g.radius)
 
 
-def _on(kind: type[ProfilePiece] | type[PolygonRound]) -> Make:
-    return lambda g: kind(*g.laws, g.first, g.radius)
+def _on(kind: type[ProfilePiece]) -> Make:
+    return lambda g: kind(*g.laws, g.first, g.radius, g.ground)
 
 
 def _in_hollow(kind: type[ProfilePiece]) -> Make:
@@ -80,7 +81,7 @@ def _in_hollow(kind: type[ProfilePiece]) -> Make:
 
 def _wheel_on_edge(g: Given) -> Contact:
     """On soil, which has no energy that parts could share."""
-    return EdgeRound(*g.laws, (*g.first[:WALLS], g.radius.graph.zero, *g.first[WALLS + 1 :]), g.radius)
+    return EdgeRound(*g.laws, (*g.first[:WALLS], g.radius.graph.zero, *g.first[WALLS + 1 :]), g.radius, g.ground)
 
 
 def _on_cell(kind: str) -> Make:
@@ -91,20 +92,21 @@ _OUTLINED = ("round", "corner", "vertex", "pad")
 #: Features that meet -> their contact.  The first is a surface, or both are of one class.
 MEETINGS: dict[tuple[str, str], Make] = {
     ("round", "round"): lambda g: RoundRound(*g.laws, (g.first[0], g.radius)),
-    ("rod", "rod"): _two_rods(RodRod),
-    ("rod", "round"): _on_segment(SegmentRound),
-    ("rod", "rounded_corner"): _on_segment(RodCorner),
-    **_each("segment", ("round", "corner", "vertex"), _on_segment(SegmentRound)),
+    ("rod", "rod"): lambda g: RodRod(*g.laws, *_two_rods(g)),
+    ("rod", "round"): _on_segment,
+    ("rod", "rounded_corner"): lambda g: RodCorner(*g.laws, g.first[0], (g.first[1], g.radius), g.second[1:]),
+    **_each("segment", ("round", "corner", "vertex"), _on_segment),
     ("ellipsoid", "round"): lambda g: EllipsoidRound(*g.laws, g.first, g.radius),
     ("ellipsoid", "rod"): lambda g: EllipsoidRod(*g.laws, g.first, g.second[1], g.radius),
     ("ellipsoid", "ellipsoid"): lambda g: EllipsoidEllipsoid(*g.laws, (g.first, g.second)),
     (BLOCK, "round"): _on_block,
     (BLOCK, "ellipsoid"): lambda g: BlockEllipsoid(*g.laws, g.first[:3], g.second),
     **_each(CORE, ("rounded_corner", "tip"), _on_block),
-    **_each("rounded_edge", ("rounded_edge", "axis"), _two_rods(EdgeRod)),
+    ("rounded_edge", "rounded_edge"): lambda g: EdgeEdge(*g.laws, *_two_rods(g)),
+    ("rounded_edge", "axis"): lambda g: EdgeRod(*g.laws, *_two_rods(g), g.first[2:]),
     **_each(FIELD, ("round", "end"), lambda g: FieldRound(*g.laws, g.field, g.radius)),
     (FIELD, "ellipsoid"): lambda g: FieldEllipsoid(*g.laws, g.field, g.second),
-    **_each(POLYGON, ("round", "corner"), _on(PolygonRound)),
+    **_each(POLYGON, ("round", "corner"), lambda g: PolygonRound(*g.laws, g.first, g.radius)),
     (POLYGON, POLYGON): lambda g: PolygonPolygon(*g.laws, g.first, g.second, g.witness),
     **_each("edge", _OUTLINED, _on(EdgeRound)),
     ("edge", "wheel"): _wheel_on_edge,
@@ -360,7 +362,7 @@ def pair_kind(
     markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
     lateral = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2] if law.planar else None
     polygons = names == (POLYGON, POLYGON)
-    inside = names[0] == INSIDE
+    inside, ground = names[0] == INSIDE, names[0] in ("edge", "arc") and kinds[0].number > 0
     corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else (sizes[0] // PIECE,) if inside else ()
     sizes = (OWN, OTHER) if polygons else (CHOSEN, sizes[1]) if inside else sizes
     raw = [tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)]
@@ -376,7 +378,7 @@ def pair_kind(
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
         sides = (law.name, *markers)
         laws = (*sides, push, dry)
-        one = Given(laws, raw[0], raw[1], raw[1][0], witness, field, pair.height if flat else None)
+        one = Given(laws, raw[0], raw[1], raw[1][0], witness, field, pair.height if flat else None, ground)
         contact = touching(names, one)
         on_cell = isinstance(contact, SoilCell)
         if flat and not on_cell:
@@ -424,6 +426,7 @@ def pair_kind(
         tuple(seen),
         tuple(met),
         states=len(held),
+        thin=(names[0] in ("segment", "edge", "arc")) * (2 if names[1] in ("vertex", "pad") else 1),
         calls=tuple(
             (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})
         ),

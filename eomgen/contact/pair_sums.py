@@ -82,13 +82,13 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, law, value, slope, touch, witness), with states (states, held) too
+    kinds : sequence of (first, second, planar, thin, law, value, slope, touch, witness), with states (states, held) too
         Tables of the first and the second shape; in which directions distances count (0 all, 1 across z of the first, 2
-        beside columns that reach down along y of the first without end); places of the
-        law's numbers; the function of one pair and its directional derivative, of the numbers of the first shape, of
-        the second, of the law, and of the pair's states (and of their rates in the same order); normal, penetration and
-        turning radius of the pair; the ``WITNESS`` numbers of :meth:`witnesses`; how many states a pair has, and the
-        numbers of the rows of both tables whose sum is the place of its states.
+        beside columns that reach down along y of the first without end); how thin the first is (see ``PairKind``);
+        places of the law's numbers; the function of one pair and its directional derivative, of the
+        numbers of the first shape, of the second, of the law, and of the pair's states (and of their rates in the same
+        order); normal, penetration and turning radius of the pair; the ``WITNESS`` numbers of :meth:`witnesses`; how
+        many states a pair has, and the numbers of the rows of both tables whose sum is the place of its states.
     room : int
         How many pairs :meth:`witnesses` has room for.
     states : int, optional
@@ -100,8 +100,8 @@ class PairSum:
     ):
         self.bodies, self.room, self.states = bodies, room, states
         self.tables = [np.array(table, dtype=int) for table in tables]
-        self.kinds = [(*kind[:8], *self._pairs(*kind[:2])) for kind in kinds]
-        self.held = [(kind[8], *(np.array(rows) for rows in kind[9])) if states else None for kind in kinds]
+        self.kinds = [(*kind[:9], *self._pairs(*kind[:2])) for kind in kinds]
+        self.held = [(kind[9], *(np.array(rows) for rows in kind[10])) if states else None for kind in kinds]
 
     def _pairs(self, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
         return pairs_of_rows(self.tables[first], self.tables[second], first == second)
@@ -148,7 +148,7 @@ class PairSum:
         least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
         deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
         starts = np.cumsum([0, *map(len, self.tables)])
-        for first, second, planar, law, _, _, touch, _, i, j in self.kinds:
+        for first, second, planar, thin, law, _, _, touch, _, i, j in self.kinds:
             (a, arm_a), (b, arm_b) = placed[first], placed[second]
             tables = self.tables[first], self.tables[second]
             if not len(i):
@@ -187,7 +187,8 @@ class PairSum:
             if getattr(touch, "inner", False):  # a law of what is inside: those apart meet other parts before
                 gap = np.where(near, gap, NEVER)
             thick = np.broadcast_to(data[tables[0][i, -1]] + data[tables[1][j, -1]], gap.shape)
-            reached = np.maximum(gap * np.where(free, BEYOND, UP_TO), WITHIN * thick)
+            passed = data[tables[0][i, -1]] if thin > 1 else thick
+            reached = np.maximum(gap * (UP_TO if thin else np.where(free, BEYOND, UP_TO)), WITHIN * passed)
             with np.errstate(all="ignore"):
                 root = np.sqrt(closing * closing + 2.0 * towards * reached)
                 time = np.where(closing > 0.0, 2.0 * reached / (closing + root), (root - closing) / towards)
@@ -225,7 +226,7 @@ class PairSum:
         placed = [self._place(table, data, None)[0] for table in self.tables]
         starts = np.cumsum([0, *map(len, self.tables)])
         result = [np.zeros((0, RECORD))]
-        for first, second, planar, law, _, _, _, witness, i, j in self.kinds:
+        for first, second, planar, _, law, _, _, _, witness, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             thick = data[tables[0][:, -1]], data[tables[1][:, -1]]
             if not len(i):
@@ -249,7 +250,7 @@ class PairSum:
         out = np.zeros((6 * self.bodies + 1 + self.states, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for (first, second, planar, law, value, slope, _, _, i, j), held in zip(self.kinds, self.held, strict=True):
+        for (first, second, planar, _, law, value, slope, _, _, i, j), held in zip(self.kinds, self.held, strict=True):
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
@@ -316,7 +317,7 @@ class PairSum:
         data = _stacked(raw)
         placed = [self._place(table, data, None)[0] for table in self.tables]
         result = []
-        for first, second, planar, _, _, _, _, _, i, j in self.kinds:
+        for first, second, planar, *_, i, j in self.kinds:
             a, b, tables = placed[first], placed[second], (self.tables[first], self.tables[second])
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             result.append((len(i), int(self._near(a, b, planar, i, j, tables, data).sum())))

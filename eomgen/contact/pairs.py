@@ -60,6 +60,9 @@ class PairKind:
         Of two polygons: how many corners they have.  The numbers of the shapes are those that matter then, which
         :mod:`~.pair_features` finds.  Of the inside of an outline and another shape: how many pieces it has, of which
         the nearest is found there.
+    thin : int
+        1 where the first has a far side though no bounds, so that no step may pass it; 2 where a point of the second
+        may, so that its thickness alone limits steps.
     lines : tuple of (start, count)
         Of first shapes that are columns of soil: rows of the first table that stand in line along their x axis, each
         its first size farther than the one before.  Columns reach down without end, so that what is below their top
@@ -81,6 +84,7 @@ class PairKind:
     states: int = 0
     calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
     corners: tuple[int, ...] = ()
+    thin: int = 0
     lines: tuple[tuple[int, int], ...] = ()
 
     def graph(self) -> Graph:
@@ -217,7 +221,7 @@ class PairFunction:
         """Its loops on numbers, with an evaluator of expressions for the laws."""
         kinds = [
             (
-                *(k.first, k.second, k.extent, k.law),
+                *(k.first, k.second, k.extent, k.thin, k.law),
                 *(self._law(k, part, made) for part in ("outputs", "slopes", "touch", "witness")),
                 *k.beside,
             )

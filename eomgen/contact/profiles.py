@@ -17,7 +17,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
-from .limits import EVEN, FLAT_CORNER, ROOM, SHARED
+from .limits import BELOW, EVEN, FLAT_CORNER, NOWHERE, ROOM, SHARED
 from .pair_features import PIECE
 from .point import Contact, Touch
 
@@ -223,12 +223,20 @@ def part(side: Expr, width: Expr) -> Expr:
 class ProfilePiece(Contact):
     """A circle about the second marker on a piece of a profile in the x-y plane of the first.
 
-    The last of ``sizes`` is how deep a centre may be in the solid.  A deeper one feels nothing of a profile; out of an
-    outline :class:`InsideRound` pushes it.
+    The last of ``sizes`` is how deep a centre may be in the solid.  Out of an outline :class:`InsideRound` pushes a
+    deeper one.  Below a profile (``ground``) the law is undefined down to ``BELOW`` times that depth, so that a run
+    stops there; what is deeper touches nothing.
     """
 
     sizes: tuple[Expr, ...]
     radius: Expr
+    ground: bool = False
+
+    def deepest(self, view: View) -> Expr | None:
+        share = self.share(view)
+        if not self.ground or share is None:
+            return None
+        return where(view.graph.apply("lt", 0.0, share), self.radius + self.sizes[-1], NOWHERE)
 
     def _place(self, view: View) -> tuple[Expr, Expr, Vec3]:
         reach = vec.sub(view.position(self.second), view.position(self.first))
@@ -238,7 +246,8 @@ class ProfilePiece(Contact):
     def _touching(self, view: View, gap: Expr, normal: tuple[Expr, Expr], reach: Vec3) -> Touch:
         out = vec.times(view.rotation(self.first), (*normal, view.graph.zero))
         thick = self.sizes[-1]
-        depth = where(view.graph.apply("lt", gap, -thick), -thick, self.radius - gap)
+        end = BELOW * (self.radius + thick) - self.radius if self.ground else thick
+        depth = where(view.graph.apply("lt", gap, -end), -thick, self.radius - gap)
         second = vec.scale(0.5 * depth - self.radius, out)
         return out, depth, vec.add(reach, second), second
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 from abc import abstractmethod
 from collections.abc import Sequence
+from functools import reduce
+from operator import add
 
 from ..elements.forces.force import View, where
-from ..elements.forces.normal_laws import NormalLaw
 from ..elements.frames import Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
@@ -149,8 +150,8 @@ class AtHeight(Contact):
     def grip(self, view: View) -> Expr | None:
         return self.flat.grip(view)
 
-    def law_here(self, view: View) -> NormalLaw:
-        return self.flat.law_here(view)
+    def deepest(self, view: View) -> Expr | None:
+        return self.flat.deepest(view)
 
     def couple(self, view: View) -> Vec3 | None:
         return self.flat.couple(view)
@@ -218,13 +219,14 @@ def cuboid_parts(size: Sequence[Expr], edge: Expr) -> list[CuboidPart]:
     for n, (i, j, k) in enumerate(ways):
         result.append(("end", (i * halves[0], j * halves[1], k * halves[2]), plain, (zero,), zero, n))
     result.append((CORE, (zero, zero, zero), plain, (x, y, z, edge), reach, 0))
-    result += [("rounded_corner", (i * x, j * y, k * z), plain, (edge,), edge, n) for n, (i, j, k) in enumerate(ways)]
+    for n, (i, j, k) in enumerate(ways):
+        result.append(("rounded_corner", (i * x, j * y, k * z), plain, (edge, i * x, j * y, k * z), edge, n))
     for k in range(3):
         for n, (i, j) in enumerate(itertools.product((-1.0, 1.0), repeat=2)):
             place = [zero, i * inner[(k + 1) % 3], j * inner[(k + 2) % 3]]
             order = (k, (k + 1) % 3, (k + 2) % 3)
             at = (place[-k % 3], place[(1 - k) % 3], place[(2 - k) % 3])
-            result.append(("rounded_edge", at, order, (inner[k], edge), inner[k] + edge, 4 * k + n))
+            result.append(("rounded_edge", at, order, (inner[k], edge, *place[1:]), inner[k] + edge, 4 * k + n))
     return result
 
 
@@ -262,47 +264,73 @@ class SharedEnergy(Contact):
         return vec.sub(about, vec.cross(arm, self.aside(view)))
 
 
+def beside_ends(
+    view: View, rod: tuple[Marker, Expr], solid: tuple[Marker, Vec3, Vec3], depth: Expr, radius: Expr
+) -> Expr:
+    """The part of the law of a rod's middle at depth d that counts beside its ends, which touch the solid themselves.
+
+    With the depth e of the deeper end in the cuboid, given by the place of a marker from its centre and half lengths,
+    it is 1 - (e / d)^2, not below 0: with that of the end the energy is the law's at the end and far from it, and
+    nowhere more than that of the deeper, of laws that are linear or stiffen.
+    """
+    graph, (marker, half), (other, centre, halves) = view.graph, rod, solid
+    along, ends = along_axis(view, marker, 0), list[Expr]()
+    reach = vec.sub(view.position(marker), view.position(other))
+    for end in (-half, half):
+        place = vec.add(centre, vec.transpose_times(view.rotation(other), vec.add(reach, vec.scale(end, along))))
+        out = [graph.apply("max", x, -x) - h for x, h in zip(place, halves, strict=True)]
+        square = reduce(add, (graph.apply("max", 0.0, x) * graph.apply("max", 0.0, x) for x in out))
+        apart, inside = graph.apply("lt", 0.0, square), reduce(lambda a, b: graph.apply("max", a, b), out)
+        ends.append(radius - where(apart, sqrt(where(apart, square, 1.0)), inside))
+    deep = graph.apply("lt", 0.0, depth)
+    part = graph.apply("min", 1.0, graph.apply("max", 0.0, graph.apply("max", *ends)) / where(deep, depth, 1.0))
+    return where(deep, 1.0 - part * part, 1.0)
+
+
 @dataclass(frozen=True)
-class EdgeRod(SharedEnergy, RodRod):
-    """An edge of a cuboid on an edge or a rod: where they cross, not where one ends, as corners touch there.
+class EdgeEdge(SharedEnergy, RodRod):
+    """An edge of a cuboid on another: where they cross, not where one ends, as corners touch there.
 
     The energy is that of the law times the square of the sine of their angle, and times parts that go to 0 towards both
     ends of both within their radii.
     """
 
     def share(self, view: View) -> Expr:
+        return self._share(view, 2)
+
+    def _share(self, view: View, ending: int) -> Expr:
         a, b, s, t, _ = self._nearest(view)
         cross = vec.cross(a, b)
         part = vec.dot(cross, cross)
-        for x, half, radius in zip((s, t), self.halves, self.radii, strict=True):
+        for x, half, radius in list(zip((s, t), self.halves, self.radii, strict=True))[:ending]:
             part = part * _rising((half - view.graph.apply("max", x, -x)) / radius)
         return part
 
 
 @dataclass(frozen=True)
-class RodCorner(SharedEnergy, SegmentRound):
-    """A corner of a cuboid on a rod, between its ends, which touch the cuboid by themselves.
+class EdgeRod(EdgeEdge):
+    """An edge of a cuboid on a rod, whose ends touch the cuboid by themselves."""
 
-    With the depths d of the corner in the rod and e in the sphere at the rod's nearer end the energy is that of the law
-    times 1 - (e / d)^2: with that of the sphere it is the law's at the end and far from it, and between them no more,
-    of laws that are linear or stiffen.
-    """
+    centre: tuple[Expr, Expr]  #: from the cuboid's to the edge's, along y and z of the edge
 
     def share(self, view: View) -> Expr:
-        graph, depth = view.graph, self.touch(view)[1]
-        place = vec.dot(along_axis(view, self.first, 0), vec.sub(view.position(self.second), view.position(self.first)))
-        beside = graph.apply("max", 0.0, self.half - graph.apply("max", place, -place))
-        across = self.radii[0] + self.radii[1] - depth
-        at_end = graph.apply("max", 0.0, self.radii[0] + self.radii[1] - _hypot(across, beside))
-        deep = graph.apply("lt", 0.0, depth)
-        part = at_end / where(deep, depth, 1.0)
-        return where(deep, 1.0 - part * part, 1.0)
+        y, z = self.centre
+        halves = (self.halves[0], view.graph.apply("max", y, -y), view.graph.apply("max", z, -z))
+        solid, radius = (self.first, (view.graph.zero, y, z), halves), self.radii[0] + self.radii[1]
+        beside = beside_ends(view, (self.second, self.halves[1]), solid, self.touch(view)[1], radius)
+        return self._share(view, 1) * beside
 
 
-def _hypot(x: Expr, y: Expr) -> Expr:
-    square = x * x + y * y
-    apart = x.graph.apply("lt", 0.0, square)
-    return where(apart, sqrt(where(apart, square, 1.0)), 0.0)
+@dataclass(frozen=True)
+class RodCorner(SharedEnergy, SegmentRound):
+    """A corner of a cuboid on a rod, whose ends touch the cuboid by themselves."""
+
+    corner: Vec3  #: from the cuboid's centre
+
+    def share(self, view: View) -> Expr:
+        x, y, z = (view.graph.apply("max", k, -k) for k in self.corner)
+        solid, radius = (self.second, self.corner, (x, y, z)), self.radii[0] + self.radii[1]
+        return beside_ends(view, (self.first, self.half), solid, self.touch(view)[1], radius)
 
 
 @dataclass(frozen=True)

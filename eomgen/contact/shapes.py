@@ -69,7 +69,7 @@ class Feature(NamedTuple):
     slot : int
         Its number among those of its class on the shape.
     number : int
-        How many corners or pieces it has, where its law differs by it.
+        How many corners or pieces it has, where its law differs by it; 1 of a piece of a profile.
     """
 
     kind: str
@@ -237,7 +237,14 @@ class ContactShape:
             own_depth = zero.graph.apply("min", depth, most)
         result = [
             Feature(
-                one.kind, one.frame(frame), (*one.sizes, own_depth), None if one.open else one.half + own_depth, depth
+                *(
+                    one.kind,
+                    one.frame(frame),
+                    (*one.sizes, own_depth),
+                    None if one.open else one.half + own_depth,
+                    depth,
+                ),
+                number=int(self.kind in GROUNDS),
             )
             for one in surface
         ]

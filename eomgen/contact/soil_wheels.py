@@ -80,7 +80,9 @@ class SoilWheel(Contact):
         pressed, sheared = self._sums(motion._replace(depth=where(inside, motion.depth, self.radius)))
         part = self._passive(view, motion, pressed, sheared)
         sums = [x + part * y for x, y in zip((*pressed, *(view.graph.zero,) * 4), sheared, strict=True)]
-        scale = self._shared(view, self.width * self.radius)
+        scale, most = self._shared(view, self.width * self.radius), self.flat.deepest(view)
+        if most is not None:
+            scale = where(view.graph.apply("lt", most, motion.depth), sqrt(most - motion.depth), scale)
         force_along, force_up, force_across, torque, tilt, yaw = (where(inside, scale * x, 0.0) for x in sums)
         force = vec.add(vec.add(vec.scale(force_along, along), vec.scale(force_up, normal)),
                         vec.scale(force_across, sideways))  # fmt: skip

@@ -8,11 +8,12 @@ from typing import Any
 import contact_scenes as scenes
 import numpy as np
 import pytest
-from contact_scenes import ELASTIC, LAW, PLANAR, on
+from contact_scenes import ELASTIC, LAW, PLANAR, near, on
 from flying_bodies import check_slopes, depth_of, flying, state
 from force_judges import differences, read_back
 from refusals import refuses
 from scipy.integrate import quad
+from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 from sweeps import part_of
 
@@ -107,6 +108,50 @@ def test_depth_of_a_circle_against_brute_force(radius: float, bridges: int) -> N
     assert several >= bridges
     for px in (-0.4, 0.0, 0.5):  # below the solid
         assert mod.energy(np.array([px, -1.0, 0, 0, 0, 0]))[1] == 0.0
+
+
+@pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
+def test_gaps_are_those_of_scipy(kind: str) -> None:
+    """Apart, over and beside points, beyond the ends, and down to the depth of the solid; deeper a run stops."""
+    m, (ball,) = scenes.planar("hills", 1, (0, 0, 0))
+    m.contacts("floor", {"shape": "circle", "on": ball, "radius": 0.08}, profile(m, HILLS, kind, depth=0.05), ELASTIC)
+    mod = m.compile(target="numpy")
+    ends = [np.array(HILLS[i]) + 9 * np.subtract(HILLS[i], HILLS[j]) for i, j in ((0, 1), (-1, -2))]
+    pieces = scenes.straight([ends[0], *HILLS, ends[1]]) if kind == "profile" else scenes.smooth(HILLS, closed=False)
+    rng, met, deep = np.random.default_rng(8), 0, 0
+    starts = np.array([one.start for one in pieces[1:]])
+    points = np.column_stack([rng.uniform(-0.8, 0.9, 160), rng.uniform(-0.1, 0.18, 160)])
+    beside = starts[rng.integers(len(starts), size=60)] + 10 ** rng.uniform(-13, -2, (60, 1)) * rng.normal(size=(60, 2))
+    for c in [*points, *beside]:
+        gap, q = scenes.nearest_on(pieces, c, closed=False)[0], np.array([*c, 0.3])
+        if -0.0499 < gap < 0.0799:
+            scenes.check_nearest(mod, q, 0.08, pieces, c, closed=False)
+            met, deep = met + 1, deep + (gap < -0.01)
+        elif -0.16 < gap < -0.0501:
+            with pytest.raises(eg.NonFiniteError, match="floor .* deeper below the profile than its depth"):
+                mod.energy(np.array([*q, 0, 0, 0]))
+    assert (met > 60) & (deep > 15)
+
+
+@pytest.mark.parametrize("shape", ["box", "circle"])
+@pytest.mark.parametrize("kind", ["profile", "smooth_profile"])
+def test_nothing_falls_through_unnoticed(shape: str, kind: str) -> None:
+    """A depth of 1 mm and laws that are too soft: a body stays above, or the run ends and names the contact."""
+    m, (body,) = scenes.planar("fall", 1)
+    m.parameter("k", 1e3)
+    points = [(x, 0.05 * np.sin(3 * x)) for x in np.linspace(-2, 2, 9)]
+    floor = profile(m, [(-2, 0), (2, 0)] if kind == "profile" else points, kind, depth=1e-3)
+    m.contacts("floor", on(PLANAR[shape], body), floor, {"stiffness": "k", "exponent": 1.5})
+    mod, rng, ended = m.compile(target="numpy"), np.random.default_rng(1), 0
+    for method in ("DOP853", "RK45") * 3:
+        start = {"j0_y": rng.uniform(0.3, 1.0), "j0_y_dot": -(10 ** rng.uniform(-1, 1.5)), "j0_3": rng.uniform(-3, 3)}
+        try:
+            run = mod.simulate(0.5, start, {"k": 10 ** rng.uniform(0, 5)}, method=method)
+            assert run["j0_y"].min() > -0.2
+        except eg.SimulationError as error:
+            assert "loads of floor are not (a shape is deeper below the profile" in str(error)
+            ended += 1
+    assert ended >= 4
 
 
 @pytest.mark.parametrize("points", [5, 40])
@@ -282,6 +327,44 @@ def test_a_dome_and_a_bowl(hollow: bool) -> None:
         assert np.abs(force[:3] + force[6:9]).max() <= 1e-12 * np.abs(force).max()
         if k < 3:
             check_slopes(mod, x)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "ellipsoid"])
+def test_gaps_over_waves_are_those_of_scipy(kind: str) -> None:
+    """Above, grazing and deep: the way between two points of one normal; of spheres SciPy looks for the nearest too.
+
+    Deep up to 0.7 of the least radius of curvature of the ground, 1 / 0.8 (amplitude 0.2, wave number 2).
+    """
+    m, (body,) = flying(1)
+    axes = np.array(SHAPES[kind].get("semi_axes", [0.1] * 3))
+    height = "0.2*sin(2*x)*cos(1.5*y)"
+    m.contacts("touch", {**SHAPES[kind], "on": body}, ground(height, on=m.ground), ELASTIC)
+    mod, rng, met = m.compile(target="numpy"), np.random.default_rng(12), 0
+
+    def surface(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        (sx, sy), (cx, cy) = np.sin([2 * s[0], 1.5 * s[1]]), np.cos([2 * s[0], 1.5 * s[1]])
+        n = np.array([-0.4 * cx * cy, 0.3 * sx * sy, 1.0])
+        return np.array([*s, 0.2 * sx * cy]), n / np.linalg.norm(n)
+
+    for gap in (0.03, 0.01, 1e-3, 1e-6, -1e-9, -1e-6, -1e-3, *(-np.array([0.01, 0.05, 0.12, 0.3, 0.6]))) * 4:
+        turn, place = Rotation.random(random_state=rng.integers(1 << 30)), rng.uniform(-1.5, 1.5, 2)
+        point, n = surface(place)
+        own = turn.apply(axes**2 * turn.inv().apply(n) / np.linalg.norm(axes * turn.inv().apply(n)))
+        if kind == "ellipsoid" and gap < -0.12:
+            continue  # deeper than its own radii of curvature
+        x = state(mod, [point + gap * n + own], [turn])
+
+        if kind == "sphere":
+            centre = x[:3]
+            found = minimize(lambda s, c=centre: float(np.sum((surface(s)[0] - c) ** 2)), centre[:2], tol=1e-15)
+            assert np.sqrt(found.fun) == pytest.approx(0.1 + gap if gap > -0.1 else -0.1 - gap, abs=1e-9)
+        (one,) = near(mod, x[: mod.n_q])
+        assert abs(one.depth + gap) < 1e-9
+        met += 1
+        sign = -1.0 if one.kinds[0] != "height_field" else 1.0
+        np.testing.assert_allclose(sign * one.normal, n, atol=1e-8)
+        np.testing.assert_allclose(one.middle, point + 0.5 * gap * n, atol=1e-8)
+    assert met > 30
 
 
 @pytest.mark.thorough

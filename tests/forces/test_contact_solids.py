@@ -58,9 +58,40 @@ def on_numbers() -> eg.Module:
     return every_pair().compile(target="numpy")
 
 
+@cache
+def in_c() -> eg.Module:
+    return every_pair().compile(optimize=0)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(5))
+def test_random_scenes_keep_momenta_and_gain_no_energy(seed: int) -> None:
+    """20 scenes of two bodies, each with shapes of all kinds, that are thrown at each other."""
+    mod, rng, met = in_c(), np.random.default_rng(seed), 0
+    masses, inertia = np.array([1.0, 2.0]), np.array([0.01, 0.012, 0.015])
+    for _ in range(20):
+        way = rng.standard_normal(3)
+        way *= 1.3 / np.linalg.norm(way)
+        turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
+        x = state(mod, [(0, 0, 0), way], turns)
+        x[mod.n_q :] = np.concatenate([rng.normal(size=6), -rng.uniform(0.5, 1.5) * way, rng.normal(size=3)])
+        run = mod.simulate(1.5, dict(zip(mod.x_names, x, strict=True)), rtol=1e-9, atol=1e-11)
+        energy = np.sum(mod.energy(run.x), axis=0)
+        assert np.diff(energy).max() < 1e-6 * energy[0]
+        met += energy[-1] < (1.0 - 1e-6) * energy[0]
+        both = np.zeros((6, len(run.t)))
+        for k in range(2):
+            q, v = run.x[7 * k : 7 * k + 7], run.x[14 + 6 * k : 20 + 6 * k]
+            turn = Rotation.from_quat(q[[4, 5, 6, 3]].T)
+            spin = turn.apply(inertia * v[3:].T) + masses[k] * np.cross(q[:3].T, v[:3].T)
+            both += np.vstack([masses[k] * v[:3], spin.T])
+        assert np.abs(both - both[:, :1]).max() < 1e-8 * np.abs(both).max()
+    assert met > 3
+
+
 def test_every_pair_in_both_targets() -> None:
     """Momentum is kept, forces at rest are slopes of the energy, Jacobians are differences, C gives the numbers."""
-    mod, quick = on_numbers(), every_pair().compile(optimize=0)
+    mod, quick = on_numbers(), in_c()
     rng, met = np.random.default_rng(5), 0
     while met < 10:
         turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
@@ -248,10 +279,7 @@ def test_flat_ellipsoids_lie_deep(second: dict[str, Any], most: float) -> None:
 
 @pytest.mark.parametrize("part", [0.02, 0.5, 0.95])
 def test_a_corner_along_a_capsule(part: float) -> None:
-    """From its middle over its end the energy is continuous, that of one law at both, and never more.
-
-    The end comes nearer to an edge than to the corner where it is far enough beside it.
-    """
+    """From its middle over its end the energy is continuous, that of one law at both, and never more."""
     m, (a, b) = flying(2)
     edge = 0.02
     m.contacts("touch", {**BLOCK, "edge_radius": edge, "on": a}, {**ROD, "on": b}, ELASTIC)
@@ -266,14 +294,43 @@ def test_a_corner_along_a_capsule(part: float) -> None:
     ]
     energy = np.array([mod.energy(x)[1] for x in states]) / (STIFF * depth**2.5 / 2.5)
     np.testing.assert_allclose(energy[[0, 100, 200]], 1.0, rtol=1e-9)
-    at_corner = 0.2 - ways < (edge + 0.05 - depth) * np.sqrt(2 / 3)
-    assert energy[at_corner].max() <= 1.0 + 1e-9
-    assert energy.max() <= 1.01
+    assert energy.max() <= 1.0 + 1e-9
     assert energy[:201].min() > 0.9
     assert np.abs(np.diff(energy)).max() < 0.2
     assert energy[-1] == 0.0
     for x in states[195:206:5]:
         check_slopes(mod, x)
+
+
+NEEDLE, BLADE = ({"shape": "ellipsoid", "semi_axes": axes} for axes in ((0.3, 0.03, 0.03), (0.3, 0.09, 0.03)))
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [(NEEDLE, NEEDLE), (NEEDLE, PANCAKE), (BLADE, ROD), (BLOCK, NEEDLE)], ids=repr
+)
+def test_slim_ellipsoids_lie_deep(first: dict[str, Any], second: dict[str, Any]) -> None:
+    """Half axes of 10 : 1 at points of known normals, to 0.94 of the depth at which the nearest place is not unique."""
+    m, (a, b) = flying(2)
+    m.contacts("touch", {**first, "on": a}, {**second, "on": b}, ELASTIC)
+    mod, rng = m.compile(target="numpy"), np.random.default_rng(1)
+
+    def unique(shape: dict[str, Any], n: np.ndarray) -> float:
+        axes = np.array(shape.get("semi_axes", [shape.get("radius", 0.0)] * 3))
+        return float(min(axes) ** 2 / np.linalg.norm(axes * n)) if axes.any() else 0.0
+
+    for k in range(60):
+        turns = [Rotation.random(random_state=rng.integers(1 << 30)) for _ in "ab"]
+        n = rng.standard_normal(3)
+        if first is BLOCK:
+            n[[[], [0], [1], [0, 1], [0, 2]][k % 5]] = 0
+        if second is ROD:
+            n = np.cross(turns[0].inv().apply(turns[1].apply((0, 0, 1))), n)
+        out = turns[0].apply(n / np.linalg.norm(n))
+        back = turns[1].inv().apply(-out) * (1, 1, 0 if second is ROD else 1)
+        depth = (0.5, 0.94)[k % 2] * (unique(first, n / np.linalg.norm(n)) + unique(second, back))
+        places = turns[0].apply(touched(first, n / np.linalg.norm(n), rng)), turns[1].apply(touched(second, back, rng))
+        x = state(mod, [(0, 0, 0), places[0] - places[1] - depth * out], turns)
+        assert depth_of(mod, x) == pytest.approx(depth, abs=1e-11)
 
 
 def test_the_error_names_the_contact_of_an_arm() -> None:
