@@ -215,11 +215,12 @@ class AssemblyFailure(NamedTuple):
                 f"the loops do not close{self._with(raw)}, nor with these values left free "
                 f"({self.restarts + 1} starts tried): {gaps}; {self._advice()}"
             )
-        near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
+        near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0), 12)
         dof = len(free.free) - rank(free.evaluate(q)[1]).rank
         if len(raw) > dof:
+            values = f"{len(raw)} value{'s' if len(raw) != 1 else ''}"
             return (
-                f"the given values {', '.join(raw)} are inconsistent: {len(raw)} values for {dof} "
+                f"the given values {', '.join(raw)} are inconsistent: {values} for {dof} "
                 f"degree{'s' if dof != 1 else ''} of freedom, and with all of them held {gaps}; "
                 f"give fewer, or consistent ones such as {', '.join(near)}"
             )
@@ -260,11 +261,12 @@ class AssemblyFailure(NamedTuple):
     def _with(self, raw: list[str]) -> str:
         return f" with {', '.join(raw)}" if raw else ""
 
-    def _given(self, q: Array, y: Array) -> list[str]:
+    def _given(self, q: Array, y: Array, digits: int = 6) -> list[str]:
+        """Held coordinates and functions; 12 digits are as good as the exact values where they are given back."""
         names = self.names or [f"q[{i}]" for i in range(len(q))]
-        coordinates = [f"{names[i]} = {q[i]:.6g}" for i in self.system.scales.coordinates(self.held)]
+        coordinates = [f"{names[i]} = {q[i]:.{digits}g}" for i in self.system.scales.coordinates(self.held)]
         functions = self.system.equations.names if self.system.equations else ()
-        return coordinates + [f"{name} = {value:.6g}" for name, value in zip(functions, y, strict=True)]
+        return coordinates + [f"{name} = {value:.{digits}g}" for name, value in zip(functions, y, strict=True)]
 
     def open_rows(self) -> list[tuple[str, float]]:
         """The three rows that stay open the most: label and gap."""

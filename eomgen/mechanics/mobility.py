@@ -517,8 +517,10 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         wanted = ()  # coordinates, of which there may be more than velocities
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
-        message = f"{len(wanted)} coordinates are chosen ({', '.join(wanted)}), but the mechanism has {has}"
-        raise ModelError([_choice(kinematics, message, f"choose {n_dof} of {', '.join(names)}")])
+        several = f"{len(wanted)} coordinates are" if len(wanted) > 1 else "1 coordinate is"
+        message = f"{several} chosen ({', '.join(wanted)}), but the mechanism has {has}"
+        remedy = f"choose {n_dof} of {', '.join(names)}" if n_dof else "leave independent out: it cannot move"
+        raise ModelError([_choice(kinematics, message, remedy)])
     chosen = _choose(kinematics, judged, r, wanted)
     quality = judged[0].conditioning(chosen)
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches

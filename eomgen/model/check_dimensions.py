@@ -17,14 +17,14 @@ from ..base.names import place_of_marker
 from ..base.operations import OPERATIONS
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
 from ..elements.element_type import Law
-from ..elements.kinds import Field
+from ..elements.kinds import OUTPUT, Field
 from ..expr.core import Expr, Graph, reachable
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, acts_on_length, fields_of
 from .mechanism import JointSpec, Output
 from .names import ENERGIES, RATES
 from .quantities import TURNING
-from .units import Unit, si_text
+from .units import Unit, si_text, sound_unit
 from .values import Reader
 
 _NAMES = {
@@ -58,14 +58,15 @@ def named(dimension: Dimension) -> str:
 def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
     """Note a fault for every expression whose dimension is not what its field asks for, or whose terms differ."""
     units = reader.units
-    if not units:
+    if not units and not reader.description.bindings:
         return
     names = _names(reader, units, joints)
     check = _Check(reader.graph, names)
     kinds = {c: k.kind for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True)}
     kinds |= {j.name: j.joint.coordinates[0].kind for j in joints if len(j.coordinates) == 1}
+    wrong = _check_bindings(reader, check)
     for path, expression, local in reader.expressions:
-        if reader.faults.under(path):
+        if reader.faults.under(path) or (wrong and _takes_in(reader, wrong, path, expression)):
             continue
         section, entry, steps = _place(reader.description, path)
         field, values = _field(section, entry, steps)
@@ -94,6 +95,38 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
         mass = _plain_mass(entry) if wanted == INERTIA and section == "bodies" else 0.0
         for message, remedy in check.faults(expression, wanted, certain, mass):
             reader.fault(path, message, remedy, "EG-DIMENSION")
+
+
+def _check_bindings(reader: Reader, check: _Check) -> dict[str, list[int]]:
+    """Note what instances of components give for parameters and inputs of other dimensions; their nodes by instance.
+
+    Of instances within others those are not judged that take in what is wrong with the outer one.
+    """
+    wrong: dict[str, list[int]] = {}
+    quantities, requested, count = dict(reader.quantities), dict(reader.requested), len(reader.expressions)
+    for one in sorted(reader.description.bindings, key=lambda one: one.instance.count(".")):
+        if any(one.instance.startswith(f"{outer}.") for outer in wrong):
+            continue
+        expression = reader.expression(one.path, one.text, OUTPUT)
+        unit = sound_unit(one.unit)
+        for message, remedy in check.faults(expression, None if unit is None else unit.dimension):
+            reader.fault(one.path, message, remedy, "EG-DIMENSION")
+        if reader.faults.under(one.path):
+            wrong.setdefault(one.instance, []).append(expression.id)
+    reader.quantities, reader.requested = quantities, requested  # its places in the instance ask for what it needs
+    del reader.expressions[count:]
+    return wrong
+
+
+def _takes_in(reader: Reader, wrong: Mapping[str, list[int]], path: str, expression: Expr) -> bool:
+    """Whether an expression is of an instance and has one of the nodes in it that the instance wrongly has."""
+    origin = reader.faults.origin_of(path)[1]
+    inside = [
+        nodes
+        for outer, nodes in wrong.items()
+        if origin is not None and (f"{origin.instance}.").startswith(f"{outer}.")
+    ]
+    return not set().union(*inside).isdisjoint(reachable(reader.graph, [expression.id]))
 
 
 def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Output, ...]) -> tuple[Output, ...]:

@@ -22,11 +22,11 @@ from ..expr.notation import literal
 from .build_elements import declare_contacts, declare_coordinates, element_states
 from .build_quantities import declare_states, declare_switches
 from .checks import check_keys, unknown_key
-from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin, place_of
+from .description import GROUND_NAME, SECTIONS, Binding, DescribedEntry, Description, Faults, Origin, place_of
 from .fields import ADDED, COMPONENT, fields_of
 from .names import ENERGIES, RATES, Namespace, callable_names, fault_of_name, nearest
 from .quantities import COM, QUANTITIES, TOTALS, Named
-from .units import UnitError, read_unit
+from .units import UnitError, read_unit, sound_unit
 from .values import Reader
 from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started, undotted, visit_entry
 
@@ -262,19 +262,24 @@ class Instance:
     guess: Mapping[str, Any] = field(default_factory=dict)
 
 
-def add_instance(target: Description, component: Component, instance: Instance, path: str, faults: Faults) -> bool:
-    """Add the entries of an instance to a description; False, and faults at ``path``, if it has any."""
+def add_instance(
+    target: Description, component: Component, instance: Instance, path: str, faults: Faults, whole: bool = False
+) -> bool:
+    """Add the entries of an instance to a description; False, and faults at ``path``, if that is not possible.
+
+    A wrong marker or value is a fault, and a stand-in takes its place; if ``whole``, the instance is not added then.
+    """
 
     def report(place: str, message: str, remedy: str, code: str) -> None:
         """A fault of the component itself."""
         where = component.description.place(place)
         faults.take(Problem(f"{component.place}{place}", message, remedy, *where, code))
 
+    before = len(faults)
     attached = _attachments(target, component, instance, path, faults.add)
-    values = _values(component, instance, path, faults.add, report)
-    if attached is None or values is None or not claim(target, instance, path, faults.add):
+    numbers, texts, units = _values(component, instance, path, faults.add, report)
+    if (whole and len(faults) > before) or not claim(target, instance, path, faults.add):
         return False
-    numbers, texts, units = values
     origins = {
         f"{section}.{entry.name}": f"{section}.{instance.prefix}{entry.name}"
         for section, entries in component.description.sections.items()
@@ -312,6 +317,15 @@ def add_instance(target: Description, component: Component, instance: Instance, 
         _add_marker(target, body, name, placed)
         note_attachment(name.removeprefix(instance.prefix), f"bodies.{body}.markers.{name}")
     _add_starts(target, component, instance, renaming)
+    target.absent |= {f"{instance.prefix}{name}" for name in component.description.absent}
+    for one in component.description.bindings:
+        inner = one._replace(instance=f"{instance.name}.{one.instance}", text=renaming.scalar(one.text))
+        target.bindings.append(inner)
+    for name in texts:
+        if instance.values.get(name) is not None:
+            place = f"{path}.{instance.places.get(name, name)}"
+            target.bindings.append(Binding(place, instance.name, texts[name], component.given[name].values.get("unit")))
+            target.origins[place] = Origin(place, "", "")
     return True
 
 
@@ -324,28 +338,30 @@ def _split(place: str) -> tuple[str, str]:
 
 def _attachments(
     target: Description, component: Component, instance: Instance, path: str, fault: Fault
-) -> dict[str, Attached] | None:
+) -> dict[str, Attached]:
+    """What stands in the place of each attachment; a body that is not there, where the instance gives no marker."""
     known = [*component.attachments, GROUND_NAME]
-    result, sound = {GROUND_NAME: Attached(GROUND_NAME, GROUND_NAME, {})}, True
+    result = {GROUND_NAME: Attached(GROUND_NAME, GROUND_NAME, {})}
     for name in instance.at:
         if name not in known:
             message = f"{component.name} has no attachment {name!r}"
             fault(f"{path}.at.{name}", message, nearest(str(name), known, "it has"), "EG-NAME-UNKNOWN")
-            sound = False
+    remedy = "give a body, body.marker, ground or {body, at, rpy}"
     for name in known:
+        attached = _attached(target, instance.at[name]) if name in instance.at else None
+        if attached is not None:
+            result[name] = attached
+            continue
         if name in instance.at:
-            attached = _attached(target, instance.at[name])
-            if attached is None:
-                remedy = "give a body, body.marker, ground or {body, at, rpy}; the marker must be declared before"
-                fault(f"{path}.at.{name}", f"{instance.at[name]!r} is not a marker", remedy, "EG-TYPE")
-                sound = False
-            else:
-                result[name] = attached
+            wrong = f"{instance.at[name]!r} is not a marker"
+            fault(f"{path}.at.{name}", wrong, f"{remedy}; the marker must be declared before", "EG-TYPE")
         elif name != GROUND_NAME:
-            remedy = "give a body, body.marker, ground or {body, at, rpy}"
             fault(f"{path}.at.{name}", f"the attachment {name!r} of {component.name} is missing", remedy, "EG-MISSING")
-            sound = False
-    return result if sound else None
+        if name != GROUND_NAME:
+            body = f"{instance.prefix}{name}"
+            target.absent.add(body)
+            result[name] = Attached(body, body, {})
+    return result
 
 
 #: What kinds of keys hold that may speak of an attachment.
@@ -388,44 +404,30 @@ def _attached(target: Description, reference: Any) -> Attached | None:
 
 def _values(
     component: Component, instance: Instance, path: str, fault: Fault, report: Fault
-) -> tuple[dict[str, Any], dict[str, str], dict[str, str]] | None:
+) -> tuple[dict[str, Any], dict[str, str], dict[str, str]]:
     """Numbers of parameters and inputs that stay, texts in the place of those that do not; units given with numbers."""
-    sound = True
     for name in instance.values:
         if name not in component.given:
             remedy = nearest(str(name), component.given, "parameters and inputs")
             place = instance.places.get(name, name)
             fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy, "EG-NAME-UNKNOWN")
-            sound = False
     numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
     for name, entry in component.given.items():
         read = read_instance_value(entry, instance.values.get(name), f"{path}.{instance.places.get(name, name)}", fault)
-        if read is None:
-            sound = False
-            continue
-        raw = read.value
-        if raw is not None and is_constant(raw):
+        raw = None if read is None else read.value
+        if read is not None and raw is not None and is_constant(raw):
             numbers[name] = raw
             units |= {} if read.unit is None else {name: read.unit}
         elif raw is not None:
             texts[name] = str(raw)
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
-            if _is_converted(entry.values.get("unit")):
+            if (own := sound_unit(entry.values.get("unit"))) is not None and own.size != 1.0:
                 place = f"{entry.path}.unit"
                 remedy = "give an SI unit: parameters are in SI units, so the expression is too"
                 report(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
-                sound = False
             renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed)
             texts[name] = str(renaming.scalar(value))
-    return (numbers, texts, units) if sound else None
-
-
-def _is_converted(unit: Any) -> bool:
-    """Whether a value in this unit is not the same number in SI units."""
-    try:
-        return isinstance(unit, str) and read_unit(unit).size != 1.0
-    except UnitError:  # told where the parameter is read
-        return False
+    return numbers, texts, units
 
 
 def _copy_origins(target: Description, component: Component, instance: Instance, origins: Mapping[str, str]) -> None:
@@ -601,6 +603,7 @@ class Components:
         self.given = faults.mapping("components", raw, "write the names of the components as keys")
         self.read: dict[str, Component | None] = {}
         self.within: list[str] = []
+        self.incomplete = False  #: whether an instance could not be added
 
     def read_all(self) -> None:
         """Read also those that nothing adds, so that their faults are told."""
@@ -665,6 +668,7 @@ class Components:
             return None
         if description is None:
             return None
+        self.incomplete |= description.incomplete
         return self._checked(component_of(description, name, "", self.faults, f"{path}.file"))
 
     def _checked(self, component: Component) -> Component:
@@ -686,40 +690,42 @@ class Components:
     def add(self, raw: Any, start: str, target: Description) -> None:
         """Add the instances of a section ``add`` to a description; ``start`` stands before its path."""
         for name, keys in self.faults.mapping(f"{start}add", raw, "write the names of the instances as keys").items():
-            self._add_one(name, keys, f"{start}add.{name}", target)
+            if not self._add_one(name, keys, f"{start}add.{name}", target):
+                self.incomplete = True
 
-    def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> None:
+    def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> bool:
         wrong = fault_of_name(name)
         if wrong:
             self.fault(path, *wrong, "EG-NAME-FORM")
-            return
+            return False
         if not isinstance(keys, Mapping):
             self.fault(path, f"is not {kinds.Table.says}", "write component: NAME and its other keys", "EG-TYPE")
-            return
+            return False
         for key in keys:
             if key not in ADDED:
                 self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED), "EG-NAME-UNKNOWN")
         if "component" not in keys:
             self.fault(f"{path}.component", "is missing", nearest("", self.given, "components"), "EG-MISSING")
-            return
+            return False
         component = self.find(keys["component"], f"{path}.component")
         rounds = rounds_of(keys["for"], f"{path}.for", self.fault) if "for" in keys else [{}]
         prefix = keys.get("prefix", f"{name}_")
         if prefix != "" and fault_of_name(prefix):
             remedy = "use letters, digits and underscores"
             self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", remedy, "EG-NAME-FORM")
-            return
+            return False
         if component is None or rounds is None:
-            return
+            return False
         if size_of(target) + component.size * len(rounds) > ENTRIES:
             self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances", "EG-TOO-LARGE")
-            return
+            return False
         for k, variables in enumerate(rounds):
             number = str(k + 1) if "for" in keys else ""
             before = f"{prefix.rstrip('_')}{number}_" if number else prefix
             instance = self._instance(component, f"{name}{number}", before, keys, variables, path)
             if instance is None or not add_instance(target, component, instance, path, self.faults):
-                return
+                return False
+        return True
 
     def _instance(
         self, component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Any, path: str

@@ -56,6 +56,15 @@ class Origin(NamedTuple):
     prefix: str
 
 
+class Binding(NamedTuple):
+    """An expression that takes the place of a parameter or an input of a component; ``path`` is where it stands."""
+
+    path: str
+    instance: str
+    text: str
+    unit: Any  #: of the parameter or input
+
+
 @dataclass
 class Description:
     """Everything said about a model so far, and where."""
@@ -75,7 +84,9 @@ class Description:
     instances: dict[str, str] = field(default_factory=dict)  #: instance of a component -> prefix: ``leg1`` -> ``leg1_``
     #: Path of an entry that an instance brought, or of a marker in it -> where it comes from.
     origins: dict[str, Origin] = field(default_factory=dict)
-    incomplete: bool = False  #: whether components or instances have faults, so that names are missing
+    bindings: list[Binding] = field(default_factory=list)  #: of instances of components
+    absent: set[str] = field(default_factory=set)  #: bodies that are not there, in the place of wrong attachments
+    incomplete: bool = False  #: whether instances could not be added, so that names are missing
 
     def add(
         self,
@@ -154,6 +165,7 @@ class Faults:
 
     def __init__(self, description: Description) -> None:
         self.lines, self.origins, self.written_paths = description.lines, description.origins, description.written_paths
+        self.absent = description.absent
         self.problems: list[Problem] = []
         self._seen: set[Problem] = set()
         self._paths: set[str] = set()
@@ -203,9 +215,11 @@ class Faults:
     def _merge_instances(self) -> list[Problem]:
         """Problems of what instances brought, at the entry of the component, with the names of the instances.
 
-        Those of a marker that an instance gives for an attachment are at that marker, and no follower of them is told.
+        Those of a marker or an expression that an instance has are there, and those that follow from them are left out.
         """
-        places = [(problem, *self._origin_of(problem.path)) for problem in self.problems]
+        absent = [repr(name) for name in self.absent]
+        problems = [problem for problem in self.problems if not any(name in problem.message for name in absent)]
+        places = [(problem, *self.origin_of(problem.path)) for problem in problems]
         attached = [(o.place, problem.message) for problem, _, o in places if o is not None and not o.instance]
         result: dict[Any, tuple[Problem, list[str]]] = {}
         for problem, own, origin in places:
@@ -214,21 +228,24 @@ class Faults:
             elif not origin.instance:
                 path = origin.place + problem.path[len(own) :]
                 result.setdefault((path, problem.message), (problem._replace(path=path), []))
-            elif not any(
-                f".{origin.instance.rpartition('.')[2]}.at" in place and problem.message.startswith(message)
-                for place, message in attached
-            ):
+            elif not any(_gives(origin, place) and problem.message.startswith(message) for place, message in attached):
                 path = origin.place + problem.path[len(own) :]
                 alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
                 first = problem._replace(path=path)
                 result.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
         return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in result.values()]
 
-    def _origin_of(self, path: str) -> tuple[str, Origin | None]:
+    def origin_of(self, path: str) -> tuple[str, Origin | None]:
         """The part of a path that an instance brought, and where that comes from."""
         while path and path not in self.origins:
             path = parent_of(path)
         return path, self.origins.get(path)
+
+
+def _gives(origin: Origin, place: str) -> bool:
+    """Whether a place is one where an instance that an entry is in, or its row of instances, is given something."""
+    names = {name for part in origin.instance.split(".") for name in (part, part.rstrip("0123456789"))}
+    return any(f"add.{name}." in place for name in names)
 
 
 def list_names_once(problems: Sequence[Problem]) -> list[Problem]:

@@ -384,7 +384,7 @@ class Builder(ElementMethods):
         named = named_attachments(part, self._references(at), "at", faults.add)
         instance = Instance(name, prefix, named or {}, numbers)
         if named is not None:
-            add_instance(self._description, part, instance, f"add.{name}", faults)
+            add_instance(self._description, part, instance, f"add.{name}", faults, whole=True)
         if faults:
             messages = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
             raise UsageError(f"add {part.name}: {messages}", code=faults.problems[0].code)

@@ -95,6 +95,14 @@ def read_unit(text: str) -> Unit:
     return Unit(dimension, size, text if only_si else si_text(dimension, text), text)
 
 
+def sound_unit(text: Any) -> Unit | None:
+    """The unit of a text; None where there is none, or it is at fault, which is told where the unit is read."""
+    try:
+        return read_unit(text) if isinstance(text, str) and text else None
+    except UnitError:
+        return None
+
+
 def si_text(dimension: Dimension, text: str = "") -> str:
     """The SI unit of a dimension; ``text`` is the unit that it stands for, by which angles keep their rad.
 

@@ -121,8 +121,9 @@ class Reader:
         raw = values.get(key)
         if isinstance(raw, str) and raw in types:
             return raw
-        if raw is None:
-            self.faults.missing(f"{path}.{key}", f"give one of {', '.join(types)}")
+        if raw is None:  # a code never changes: this one is EG-MISSING of joints and solids alone
+            code = "EG-MISSING" if what in ("joint", "solid") else "EG-CHOICE"
+            self.fault(f"{path}.{key}", "is missing", f"give one of {', '.join(types)}", code)
         else:
             remedy = nearest(shown(raw), types, "types")
             self.fault(f"{path}.{key}", f"no {what} of type {quoted(raw)}", remedy, "EG-CHOICE")

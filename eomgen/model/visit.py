@@ -113,6 +113,7 @@ def visit(description: Description, visitor: Visitor) -> Description:
         section: [visit_entry(section, entry, visitor) for entry in entries]
         for section, entries in description.sections.items()
     }
+    made.bindings = [one._replace(text=visitor.scalar(one.text)) for one in description.bindings]
     values = made.values
     if "gravity" in values:
         values["gravity"] = visitor.vector(values["gravity"])

@@ -257,12 +257,11 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
             description.values[key] = value
     fill(tree, "", description)
     if tree.get("components") is not None or tree.get("add") is not None:
-        before = len(faults)
         components = Components(tree.get("components"), document.lines, fill, open_file, faults)
         components.add(tree.get("add"), "", description)
         components.read_all()
         description = undotted(description)
-        description.incomplete = len(faults) > before
+        description.incomplete = components.incomplete
     description.problems = faults.problems
     return description
 
@@ -471,8 +470,11 @@ def plain_description(raw: Description) -> Description:
         section: [replace(entry, values=plain(entry.values, functions)) for entry in entries]
         for section, entries in description.sections.items()
     }
-    values, origins = plain(description.values, functions), dict(raw.origins)
-    return Description(values=values, sections=sections, instances=dict(raw.instances), origins=origins)
+    values, places = (
+        plain(description.values, functions),
+        {"origins": dict(raw.origins), "bindings": list(raw.bindings)},
+    )
+    return Description(values=values, sections=sections, instances=dict(raw.instances), **places)
 
 
 def plain(value: Any, functions: Names = frozenset()) -> Any:

@@ -264,7 +264,7 @@ class StartBranch:
             left = left - np.outer(left @ row, row)
             left[size == 0.0] = 0.0
         shown = " or ".join(
-            "(" + ", ".join(f"{n} = {x[layout.v.index(n)]:.6g}" for n in wanted) + ")" for x in result[:4]
+            "(" + ", ".join(f"{n} = {x[layout.v.index(n)]:.12g}" for n in wanted) + ")" for x in result[:4]
         ) + (" or ..." if len(result) > 4 else "")
         several = f"branches found have {shown}" if result else "no branch was found that has them"
         return AssemblyError(

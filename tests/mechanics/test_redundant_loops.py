@@ -82,6 +82,15 @@ def test_inconsistent_initial_values_are_an_error(tmp_path: Path, module: Callab
     refuses("EG-LOOP-OPEN theta psi 2.5", mod.simulate, (0, 1), {"theta": 1.0, "psi": 2.5})
 
 
+def test_consistent_values_of_a_message_are_taken_when_they_are_given_back(module: Callable[..., Any]) -> None:
+    mod = module("four_bar")
+    with pytest.raises(eg.AssemblyError) as caught:
+        mod.x0(theta=1.0, psi=2.5)
+    advice = dict(pair.split(" = ") for pair in str(caught.value).rpartition("such as ")[2].split(", "))
+    state = dict(zip(mod.x_names, mod.x0({name: float(value) for name, value in advice.items()}), strict=True))
+    assert {name: f"{state[name]:.12g}" for name in ("theta", "psi")} == advice
+
+
 def test_given_values_are_held_exactly_and_consistent_ones_may_be_redundant(module: Callable[..., Any]) -> None:
     mod = module("four_bar")
     x = mod.x0(psi=1.2, theta_dot=4.0)

@@ -340,6 +340,27 @@ def test_faults_of_adding(folder: Path, old: str, new: str, told: str) -> None:
     assert len(caught.value.problems) <= 2  # and not what follows from the missing names
 
 
+BESIDE = [  # faults elsewhere are reported together with those of an instance, and an expression where it stands
+    ("at: cart.top,", "at: cart.tip,", ["EG-TYPE :18: add.left.at.root: cart.tip", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
+    ("at: cart.top,", "", ["EG-MISSING :18: add.left.at.root:", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
+    ("{L: s}", "{q: s}", ["EG-NAME-UNKNOWN :18: add.left.parameters.q:", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
+    ("{L: s}", "{L: 2*q}", ["EG-NAME-UNKNOWN :18: add.left.parameters.L: 'q'", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
+    ("{L: s}", "{L: s*g}", ["EG-DIMENSION :18: add.left.parameters.L: s*g", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), BESIDE)
+def test_faults_of_an_instance_hide_no_others(folder: Path, old: str, new: str, expected: list[str]) -> None:
+    text = ARM.replace("{g: 9.81, s: 0.8}", "{g: {value: 9.81, unit: m/s^2}, s: {value: 0.8, unit: m}}")
+    text = text.replace("{L: 1, k", "{L: {value: 1, unit: m}, k").replace("mass: 3", "mass: M")
+    with refused(expected[0]) as caught:
+        load(folder, text.replace(old, new, 1), "arm.yaml").check()
+    codes = {words.split()[0] for words in expected}
+    assert len(caught.value.problems) == 2
+    assert {problem.code for problem in caught.value.problems} == codes
+    assert any(problem.path == "bodies.cart.mass" for problem in caught.value.problems)
+
+
 INSIDE = [
     ("type: revolute", "type: revolut", "EG-CHOICE joints.hinge.type: left.upper left.lower 'revolute'?"),
     ("x(rod.end)", "x(rod.ned)", "EG-NAME-UNKNOWN outputs.end_x.expression: 'left_upper_rod' 'ned'"),

@@ -274,7 +274,7 @@ def test_a_table_in_a_file(tmp_path: Path) -> None:
 
 BROKEN: list[tuple[str, str, str]] = [
     ("  law: {type: tabel, x: [0, 1], y: [0, 1]}", "EG-CHOICE functions.law.type: 'table'?"),
-    ("  law: {x: [0, 1], y: [0, 1]}", "EG-MISSING functions.law.type:"),
+    ("  law: {x: [0, 1], y: [0, 1]}", "EG-CHOICE functions.law.type:"),
     ("  law: {type: table, x: [0, 1]}", "EG-MISSING functions.law.y:"),
     ("  law: {type: table, x: [0, 1], y: [0, 1], w: 1}", "EG-NAME-UNKNOWN functions.law.w:"),
     ("  law: {type: table, x: [0], y: [1]}", "EG-SHAPE functions.law.x:"),

@@ -375,8 +375,8 @@ def follow_drivers(
     for name, value in options.items():
         if value is not None and name not in ("rtol", "atol", "max_step", "first_step"):  # of no meaning here
             raise no_such(
-                f"a run of a mechanism that drivers move entirely has no option {name!r}; give method= "
-                "too to integrate it"
+                f"a mechanism without degrees of freedom is moved by its drivers alone, or not at all: its run has no "
+                f"option {name!r}; give method= too to integrate it"
             )
     motion = _follow(bound, initial, forcing, start, end)
     result, _, raised = integrate(
