@@ -29,7 +29,6 @@ from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, Joint
 
 Value = Any  # a number, a text or a SymPy expression
 
-def tables() -> dict[str, dict[str, ElementType]]: ...
 def methods() -> dict[str, list[ElementType]]: ...
 
 class ElementMethods(Described):

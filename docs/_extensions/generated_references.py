@@ -24,7 +24,6 @@ from eomgen.importers.mjcf import MJCF
 from eomgen.importers.urdf import URDF
 from eomgen.importers.xml_file import ANY, INSIDE
 from eomgen.model import fields as table
-from eomgen.model.fields import joint_type
 from eomgen.runtime.refusals import EXCLUDED, KINDS
 
 
@@ -67,9 +66,8 @@ def _plain(name: str) -> Fields:
 def entries(section: str) -> Iterator[tuple[str, str, Fields]]:
     """Heading, sentence and keys of each kind of entry of a section."""
     if section == "joints":
-        for name in JOINTS:
-            kind = joint_type(name)
-            yield name, kind.doc.partition(": ")[2], {key: x for key, x in kind.keys.items() if key != "type"}
+        for name, kind in JOINTS.items():
+            yield name, kind.doc.partition(": ")[2], dict(kind.keys)
     elif section in ("forces", "constraints"):
         for name, kind in (FORCES if section == "forces" else CONSTRAINTS).items():
             only = f"  Give exactly one of {', '.join(kind.one_of)}." if kind.one_of else ""

@@ -12,12 +12,9 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import make_refnode
 
 import eomgen
-from eomgen.elements.constraints import CONSTRAINTS
-from eomgen.elements.forces import FORCES
-from eomgen.elements.joints import JOINTS
 from eomgen.errors import CODES
+from eomgen.model.fields import ELEMENTS
 
-ELEMENTS = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}
 #: Methods of Model that say or do something about the whole, in the order in which one meets them.
 GROUPS = {
     "Describe": "parameter input body bodies ground joint joints table native component attachment add initial guess "

@@ -95,12 +95,13 @@ class Entry:
         """What a key holds, or its default, read by its kind."""
         return self.read(key)
 
-    def read(self, key: str, kind: type[Field] | None = None) -> Any:
-        """The same, read as if the key was of another kind."""
+    def read(self, key: str, *own: Any, kind: type[Field] | None = None) -> Any:
+        """The same; read as if the key was of another kind, or with coordinates of the entry's own."""
         field = self.fields[key]
         if key not in self.values and field.default is None:
             return field.absent(self.reader)
-        return (kind or type(field)).read(field, self.reader, self._at(key), self.values.get(key, field.default))
+        value = self.values.get(key, field.default)
+        return (kind or type(field)).read(field, self.reader, self._at(key), value, *own)
 
     def law(self, key: str, local: Mapping[str, Expr], exclusive: bool = True) -> Expr:
         """An expression with names that it alone knows; with ``exclusive`` none may be a name of the model too."""
@@ -223,13 +224,14 @@ class ElementType(NamedTuple):
     name: str  #: the word in model files, and the method of Model
     doc: str  #: what it is, in one sentence that goes on from "Add"
     keys: Fields  #: besides ``type``, in the order of the method's arguments
-    #: Entry -> the element; None where the entry has a fault, which is noted.  Joints are read otherwise.
+    #: Entry -> the element; None where the entry has a fault, which is noted.
     read: Callable[[Entry], Any] | None = None
     one_of: tuple[str, ...] = ()  #: keys of which exactly one is given
     remedies: Mapping[str, str] = {}  #: what to do instead, for keys that people give something of another kind
     ends: tuple[str, str] = ("a", "b")  #: arguments of the method for a key of two markers or joints
     #: The entry's values -> its first-order states, as suffixes of its name, and their units.
     states: Callable[[Mapping[str, Any]], Mapping[str, str]] = lambda values: {}
+    kind: Any = object  #: of a joint its class, which says what its coordinates are before expressions are read
 
     def fields(self, what: str, types: Mapping[str, Any]) -> Fields:
         """All keys, ``type`` among them."""

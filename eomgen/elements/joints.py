@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -14,10 +15,25 @@ from ..expr.core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_
 from ..expr.differentiate import jvp
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
-from . import dimensions
-from .dimensions import LENGTH
-from .element_type import key, keys_of
-from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
+from .constraints.switching import SWITCHING
+from .dimensions import ENERGY, LENGTH, REACH, TIME
+from .element_type import ElementType, Types, key, keys_of, table
+from .kinds import (
+    MOTION,
+    Axis,
+    Choice,
+    CoordinateName,
+    CoordinateNames,
+    Fields,
+    Latexes,
+    Limits,
+    Number,
+    Pair,
+    Scalar,
+    TwoAxes,
+    Vector,
+    ref,
+)
 from .looks import JointLook, SymbolPart
 from .rotations import euler_parameters_from_matrix
 from .scalars import AXES, elementary
@@ -81,8 +97,31 @@ ROD_LENGTH = Scalar(
     not_zero="give a length other than 0; a rod without length is a spherical joint",
     allowed=NOT_NEGATIVE,
     remedy="give a length greater than 0",
-    dimension=dimensions.LENGTH,
+    dimension=LENGTH,
 )
+BETWEEN = Pair(
+    "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P", required=True
+)
+AXIS = Axis("axis of the joint, in both markers", default="z")
+AXIS_PAIR = TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
+COORDINATE = CoordinateName("name of the coordinate (the joint's name unless given)")
+COORDINATES = CoordinateNames("names of the coordinates, in order")
+LATEX = Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
+#: Data of a joint that has coordinates; the last only where it has one.
+DATA: Fields = {
+    "limits": Limits("limits of the coordinate; a run that passes one warns, but nothing stops there"),
+    "dry_friction": Number(
+        "Coulomb friction (N m or N); stored, but it does not act",
+        allowed=NOT_NEGATIVE,
+        remedy="friction must be 0 or positive",
+    ),
+    "armature": Scalar(
+        "inertia of the drive, referred to the coordinate (kg m^2 or kg)",
+        dimension=ENERGY.times(TIME, 2).times(REACH, -2),
+        allowed=NOT_NEGATIVE,
+        remedy="an inertia must be 0 or positive",
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -123,6 +162,19 @@ class Joint(ABC):
 
     def __init_subclass__(cls) -> None:
         cls.options = keys_of(cls)
+
+    @classmethod
+    def keys(cls) -> Fields:
+        """All keys of the type, in the order of the method's arguments."""
+        count = len(cls.coordinates)
+        keys = {"between": BETWEEN} | {name: field for name, field in cls.options.items() if field.required}
+        keys |= ({"axis": AXIS} if cls.has_axis else {}) | ({"axes": AXIS_PAIR} if cls.has_axes else {})
+        keys |= {"coordinate": COORDINATE} if count == 1 else {}
+        keys |= {name: field for name, field in cls.options.items() if name != "rotation"}
+        if count:
+            keys |= {"coordinates": COORDINATES, **cls.options, "limits": DATA["limits"]}
+            keys |= (DATA if count == 1 else {}) | {"latex": LATEX}
+        return keys | SWITCHING if count or cls is Weld else keys
 
     @property
     def velocities(self) -> tuple[Velocity, ...]:
@@ -851,9 +903,19 @@ class Orientation(RodJoint):
     parallel_axes = "xyz"
 
 
-#: By their words, in the order of this file.
-JOINTS: dict[str, type[Joint]] = {
-    one.type_name: one
-    for one in list(vars().values())
-    if isinstance(one, type) and issubclass(one, Joint) and "type_name" in vars(one)
-}
+def joint(kind: type[Joint]) -> ElementType:
+    """The type of joints of a class, whose documentation says what they allow."""
+    text = " ".join((inspect.getdoc(kind) or "").partition("\n\n")[0].split())
+    doc = f"a joint of type {kind.type_name}: {text}".replace(", removes", " of 6 degrees of freedom, removes")
+    doc = doc.replace(". Allows", ".  Allows")
+    return ElementType(kind.type_name, doc, kind.keys(), ends=("predecessor", "successor"), kind=kind)
+
+
+#: In the order of this file.
+JOINTS: Types = table(
+    *(
+        joint(one)
+        for one in list(vars().values())
+        if isinstance(one, type) and issubclass(one, Joint) and "type_name" in vars(one)
+    )
+)

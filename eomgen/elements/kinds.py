@@ -10,8 +10,10 @@ leaves out (:meth:`Field.is_default`).  A new kind is one class.  ``reader`` is 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from numbers import Real
 from typing import Any, ClassVar
 
 from ..base.names import LONGEST
@@ -277,6 +279,12 @@ class SomeNames(Field):
     holds = "coordinate"
     schema = any_of(ref("name"), array(ref("name")))
 
+    def read(self, reader: Any, path: str, value: Any) -> list[Any] | None:
+        listed = [value] if isinstance(value, str) else items(value)
+        if listed is None:
+            reader.wrong(path, value, self)
+        return listed
+
 
 class Reference(Field):
     """A name, with those of instances and of bodies before it: ``leg1.foot.tip``."""
@@ -324,6 +332,12 @@ class Times(Field):
     argument, annotation = "bool or int", "bool | int"
     schema = any_of({"type": "boolean"}, {"type": "integer", "minimum": 1})
 
+    def read(self, reader: Any, path: str, value: Any) -> int:
+        if isinstance(value, bool) or value is None or (isinstance(value, int) and value > 0):
+            return int(value or 0)
+        reader.wrong(path, value, self)
+        return 0
+
 
 class Sign(Field):
     """1, -1 or 0."""
@@ -331,13 +345,26 @@ class Sign(Field):
     argument, annotation = "{0, 1, -1}", "int"
     schema = enum(1, -1, 0)
 
+    def read(self, reader: Any, path: str, value: Any) -> int:
+        number = value.item() if getattr(value, "shape", None) == () else value
+        if isinstance(number, Real) and not isinstance(number, bool) and number in (-1, 0, 1):
+            return int(number)
+        remedy = "give 1 for a rising, -1 for a falling value, 0 for both"
+        reader.fault(path, f"{value!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
+        return 0
+
 
 class Number(Field):
     """A number."""
 
     argument, annotation = "float", "Value"
     schema = _NUMBER
-    read = by("number")
+
+    def read(self, reader: Any, path: str, value: Any, *_: Any) -> float | None:
+        result: float | None = reader.number(path, value)
+        if result is not None and self.allowed is not None and not self.allowed.has(result):
+            reader.fault(path, f"is {result:g}", self.remedy, "EG-RANGE")
+        return result
 
 
 class PositiveNumber(Number):
@@ -345,8 +372,9 @@ class PositiveNumber(Number):
 
     schema = any_of({"type": "number", "exclusiveMinimum": 0}, _TEXT)
 
-    def read(self, reader: Any, path: str, value: Any) -> Any:
-        return reader.number(path, value, positive=True)
+    def read(self, reader: Any, path: str, value: Any, *_: Any) -> float | None:
+        result: float | None = reader.number(path, value, positive=True)
+        return result
 
 
 class Count(Field):
@@ -826,12 +854,18 @@ class JointPair(Field):
         return [refer.joint(part) for part in items(value) or [value]]
 
 
+_SIZE: dict[str, Any] = {"allowed": NOT_NEGATIVE, "remedy": "give the largest size, 0 or positive"}
 LIMITS: Fields = {
     "lower": Number("least value (rad or m)"),
     "upper": Number("greatest value (rad or m)"),
-    "velocity": Number("greatest speed (rad/s or m/s)"),
-    "effort": Number("greatest torque or force of the drive (N m or N)"),
+    "velocity": Number("greatest speed (rad/s or m/s)", **_SIZE),
+    "effort": Number("greatest torque or force of the drive (N m or N)", **_SIZE),
 }
+
+
+def limits_nothing(key: str, value: Any) -> bool:
+    """Whether a limit is the infinity that no value passes, as URDF and MJCF files write it."""
+    return isinstance(value, int | float) and value == (-math.inf if key == "lower" else math.inf)
 
 
 class Limits(Field):
@@ -839,6 +873,33 @@ class Limits(Field):
 
     argument, annotation = "mapping", "Mapping[str, float]"
     schema, defines = define("limits", lambda: object_schema({key: _each_limit(x.doc) for key, x in LIMITS.items()}))
+
+    def read(self, reader: Any, path: str, value: Any, *own: Any) -> Any:
+        """(key, value) of what is limited, for each coordinate; a mapping has a number, or one for each coordinate."""
+        (names,) = own
+        result: list[dict[str, float]] = [{} for _ in names]
+        if not isinstance(value, Mapping):
+            reader.wrong(path, value, self)
+            value = {}
+        reader.check_keys(path, value, LIMITS)
+        for key in (key for key in LIMITS if value.get(key) is not None):
+            listed, place = items(value[key]), f"{path}.{key}"
+            values = [value[key]] if listed is None else listed
+            if len(values) != len(names):
+                message = f"{len(values)} values for {len(names)} coordinates"
+                reader.fault(place, message, f"give one for each: {', '.join(names)}", "EG-SHAPE")
+                continue
+            for k, x in enumerate(values):
+                if x is None or limits_nothing(key, x):
+                    continue
+                number = LIMITS[key].read(reader, place if listed is None else f"{place}[{k}]", x)
+                if number is not None:
+                    result[k][key] = number
+        for name, limits in zip(names, result, strict=True):
+            if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
+                message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
+                reader.fault(path, message, "exchange them", "EG-RANGE")
+        return tuple(tuple(limits.items()) for limits in result)
 
 
 def _each_limit(doc: str) -> Schema:

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from ..elements.kinds import limits_nothing
 from ..elements.matrices import about, from_quaternion
 from ..errors import MissingDependencyError, ModelError, Problem, at_odds
-from ..model.build_elements import limits_nothing
 from .limits import ELEMENTS, IMPEDANCE, LARGEST, MEMORY, SECONDS, SIZE, WAIT
 from .mujoco_process import compile_model
 from .robot import (

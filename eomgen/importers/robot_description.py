@@ -486,7 +486,7 @@ class _Writer:
 
     def _suffixes(self, joint_type: str) -> list[str]:
         """Of the coordinates of a joint of the tree, as the options have them turn."""
-        return [c.suffix for c in JOINTS[joint_type](**self._turning(joint_type)).coordinates]
+        return [c.suffix for c in JOINTS[joint_type].kind(**self._turning(joint_type)).coordinates]
 
     def _joint(self, body: RobotBody, joint: RobotJoint) -> None:
         name = self.joints[joint.name]
@@ -496,7 +496,7 @@ class _Writer:
         names = [name + suffix for suffix in self._suffixes(joint.type)]
         single = len(names) == 1
         values: Values = {"type": joint.type, "between": between}
-        if JOINTS[joint.type].has_axis:
+        if JOINTS[joint.type].kind.has_axis:
             values["axis"] = _axis(joint.axis)
         values |= self._turning(joint.type)
         if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
@@ -616,9 +616,9 @@ class _Writer:
             for link, frame in (loop.first, loop.second):
                 body, at = self.found.home[link]
                 pair.append((at @ frame).reference(self.bodies[body]))
-            suffixes = [c.suffix for c in JOINTS[loop.type].coordinates]
-            name = self.names.joint(loop.name, suffixes)
-            axis = {"axis": _axis(loop.axis)} if JOINTS[loop.type].has_axis else {}
+            kind = JOINTS[loop.type].kind
+            name = self.names.joint(loop.name, [c.suffix for c in kind.coordinates])
+            axis = {"axis": _axis(loop.axis)} if kind.has_axis else {}
             self._add("joints", name, {"type": loop.type, "between": pair, **axis}, loop.place)
 
     def _ties(self) -> None:

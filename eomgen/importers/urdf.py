@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..base.value_rules import SWITCH
+from ..elements.kinds import limits_nothing
 from ..errors import ModelError
-from ..model.build_elements import limits_nothing
 from .limits import LARGEST
 from .robot import (
     CONVERTED,

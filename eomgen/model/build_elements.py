@@ -2,81 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 from ..base.value_rules import TURN
-from ..elements import kinds
 from ..elements.constraints import Constraint
 from ..elements.constraints.cams import Profile
 from ..elements.constraints.switching import SWITCHING
 from ..elements.element_type import ElementType, Entry, Types
 from ..elements.forces import FORCES
-from ..elements.joints import JOINTS, Joint
-from ..elements.kinds import LIMITS, Scalar
+from ..elements.joints import DATA, JOINTS, Joint
+from ..elements.kinds import Scalar
 from ..errors import ModelError
 from ..expr.core import symbols_of
 from ..expr.records import dataclass
 from .checks import check_keys, check_names
 from .description import DescribedEntry, Description, items
-from .fields import JOINT_DATA, joint_fields
 from .mechanism import STATE_RATE, FirstOrderState, JointSpec
 from .placement import TURNS, turn_matrix
 from .requirements import Requirements
 from .sympy_face import name_of
 from .values import Reader, take_coordinates_latex, take_latex
-
-Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
-
-
-def limits_nothing(key: str, value: Any) -> bool:
-    """Whether a limit is the infinity that no value passes, as URDF and MJCF files write it."""
-    return isinstance(value, int | float) and value == (-math.inf if key == "lower" else math.inf)
-
-
-def read_limits(reader: Reader, path: str, raw: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
-    """Limits of each coordinate of a joint.
-
-    A mapping of ``lower``, ``upper``, ``velocity`` and ``effort``, each a number, or a list of one for each coordinate.
-    """
-    if not isinstance(raw, Mapping):
-        reader.wrong(path, raw, kinds.Limits)
-        return tuple(() for _ in coordinates)
-    check_keys(path, raw, LIMITS, reader.faults)
-    result: list[list[tuple[str, float]]] = [[] for _ in coordinates]
-    for key in LIMITS:
-        if key not in raw or raw[key] is None:
-            continue
-        listed = items(raw[key])
-        values = [raw[key]] if listed is None else listed
-        if len(values) != len(coordinates):
-            message = f"{len(values)} values for {len(coordinates)} coordinates"
-            reader.fault(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}", "EG-SHAPE")
-            continue
-        for k, value in enumerate(values):
-            place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
-            number = None if value is None or limits_nothing(key, value) else reader.number(place, value)
-            if number is not None and number < 0 and key in ("velocity", "effort"):
-                reader.fault(place, f"is {number:g}", "give the largest size, 0 or positive", "EG-RANGE")
-            elif number is not None:
-                result[k].append((key, number))
-    for name, collected in zip(coordinates, result, strict=True):
-        limits = dict(collected)
-        if limits.get("lower", -math.inf) > limits.get("upper", math.inf):
-            message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
-            reader.fault(path, message, "exchange them", "EG-RANGE")
-    return tuple(tuple(collected) for collected in result)
-
-
-def read_dry_friction(reader: Reader, path: str, raw: Any) -> float:
-    """Coulomb friction of a joint (N m or N), as data."""
-    value = reader.number(path, raw)
-    if value is not None and value < 0:
-        reader.fault(path, f"is {value:g}", "friction must be 0 or positive", "EG-RANGE")
-    return value or 0.0
-
 
 WELD = "weld"
 
@@ -104,7 +51,7 @@ def _lock_of(entry: DescribedEntry) -> tuple[DescribedEntry | None, DescribedEnt
     if kind == WELD:
         held = {"axes": "xyz", "turning": "xyz", **{key: x for key, x in rest.items() if key != "type"}}
         return None, replace(entry, values={"type": "hold", **held, **own})
-    if not JOINTS[kind].coordinates:
+    if not JOINTS[kind].kind.coordinates:
         return entry, None
     return replace(entry, values=rest), replace(entry, values={"type": "lock", "joint": entry.name, **own})
 
@@ -113,7 +60,7 @@ def _lock_of(entry: DescribedEntry) -> tuple[DescribedEntry | None, DescribedEnt
 class Declared:
     """A joint whose type and coordinates are known, before its markers and expressions are looked up."""
 
-    entry: DescribedEntry
+    entry: Entry
     joint: Joint
     coordinates: tuple[str, ...]
     named: bool
@@ -134,7 +81,7 @@ def coordinate_names(
 
 def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
     """A joint from its raw keys, whose faults are told elsewhere."""
-    kind = JOINTS[type_name]
+    kind: type[Joint] = JOINTS[type_name].kind
     raw = {key: values[key] for key in kind.options if isinstance(values.get(key), str)}
     return kind(**{key: field.default for key, field in kind.options.items()} | raw)
 
@@ -143,20 +90,19 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
     """Check types, keys and coordinates of all joints and take the coordinates into the namespace."""
     result = []
     for entry in check_names(entries, "joint", reader.faults):
-        at_fault = reader.faults.under(entry.path)
-        type_name = "" if at_fault else reader.type_of(entry.path, entry.values, JOINTS, "joint")
-        if not type_name:  # its coordinates are known all the same, so that their users are not at fault too
+        e = Entry(reader, entry.name, entry.path, entry.values)
+        element, path = _type_of(e, "joint", JOINTS), e.path
+        if element is None:  # its coordinates are known all the same, so that their users are not at fault too
             for key in ("coordinate", "coordinates"):
-                if key in entry.values:
-                    for name in coordinate_names("", entry.name, {key: entry.values[key]})[0]:
-                        reader.names.declare("coordinate", name, f"{entry.path}.{key}")
+                if key in e.values:
+                    for name in coordinate_names("", e.name, {key: e.values[key]})[0]:
+                        reader.names.declare("coordinate", name, f"{path}.{key}")
             continue
-        joint = _joint(reader, entry, type_name)
-        names, named = coordinate_names(type_name, entry.name, entry.values, joint)
+        joint = _without_expressions(e, element.kind)
+        names, named = coordinate_names(element.name, e.name, e.values, joint)
         count = len(joint.coordinates)
-        path = entry.path
         if named:
-            path += ".coordinate" if "coordinate" in entry.values else ".coordinates"
+            path += ".coordinate" if "coordinate" in e.values else ".coordinates"
         if len(names) != count:
             remedy = f"name all {count}, in the order {', '.join(c.suffix.strip('_') for c in joint.coordinates)}"
             plural = "" if len(names) == 1 else "s"
@@ -164,87 +110,56 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
         for k, name in enumerate(names):
             parameter = k < count and joint.coordinates[k].kind == "parameter"
             reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
-        if "latex" in entry.values and count and len(names) == count:
-            others = [f"{name}_dot" for name in names] + [
-                entry.name + w.suffix for w in joint.velocities if w.of is None
-            ]
-            take_coordinates_latex(reader, f"{entry.path}.latex", names, entry.values["latex"], others)
-        for velocity in joint.velocities:
-            if velocity.of is None:
-                reader.names.declare("velocity", entry.name + velocity.suffix, entry.path)
+        own = [e.name + velocity.suffix for velocity in joint.velocities if velocity.of is None]
+        if "latex" in e.values and count and len(names) == count:
+            others = [f"{name}_dot" for name in names] + own
+            take_coordinates_latex(reader, f"{e.path}.latex", names, e.values["latex"], others)
+        for name in own:
+            reader.names.declare("velocity", name, e.path)
         if len(names) == count:
-            result.append(Declared(entry, joint, tuple(str(n) for n in names), named))
+            result.append(Declared(e, joint, tuple(str(n) for n in names), named))
     return result
+
+
+def _without_expressions(e: Entry, kind: type[Joint]) -> Joint:
+    """The joint with stand-ins for options that are expressions, whose names are not all known yet."""
+    if {"coordinate", "coordinates"} <= e.values.keys():
+        e.fault("coordinates", "coordinate is given too", "leave out one of them")
+    options = {
+        key: e.fields[key].absent(e.reader) if isinstance(e.fields[key], Scalar) else e[key] for key in kind.options
+    }
+    if options.get("rotation") == "euler_parameters" and "sequence" in e.values:
+        remedy = "leave out sequence, or choose rotation: euler_angles"
+        e.fault("sequence", "Euler parameters have no sequence", remedy)
+    return kind(**options)
 
 
 def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, ...]:
     """Look up the markers of joints and turn them so that the axis is their z; joints with faults are left out."""
     result = []
     for joint in declared:
-        path, values = joint.entry.path, joint.entry.values
-        pair = reader.pair(f"{path}.between", values["between"]) if "between" in values else None
-        kind = _with_expressions(reader, joint)
-        columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
-        if "axes" in values:
-            if "axis" in values:
-                reader.fault(f"{path}.axes", "axis is given too", "leave out one of them", "EG-CONFLICT")
-            columns = reader.axes(f"{path}.axes", values["axes"])
+        e, names = joint.entry, joint.coordinates
+        pair = e.pair()
+        expressions = [key for key, field in joint.joint.options.items() if isinstance(field, Scalar)]
+        values = {key: e.read(key, names[: e.fields[key].own]) for key in expressions if key in e.values}
+        columns = reader.axis(f"{e.path}.axis", e.values["axis"]) if "axis" in e.values else TURNS["z"]
+        if "axes" in e.values:
+            if "axis" in e.values:
+                e.fault("axes", "axis is given too", "leave out one of them")
+            columns = reader.axes(f"{e.path}.axes", e.values["axes"])
         if pair is None:
             continue
         if pair[0].body == pair[1].body:
             message = f"{pair[0].label} and {pair[1].label} are on the same body"
-            reader.fault(f"{path}.between", message, "connect two bodies, or a body and ground", "EG-REFERENCE")
+            e.fault("between", message, "connect two bodies, or a body and ground", "EG-REFERENCE")
             continue
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
             pair = (pair[0].turned(turn), pair[1].turned(turn))
-        spec = JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named, axes=columns)
-        result.append(_with_data(reader, spec, path, values))
+        data = {key: x for key in DATA if key in e.values and key in e.fields and (x := e.read(key, names)) is not None}
+        kind = replace(joint.joint, **values)
+        result.append(JointSpec(e.name, kind, *pair, names, joint.named, axes=columns, **data))
     return tuple(result)
-
-
-def _with_data(reader: Reader, spec: JointSpec, path: str, values: dict[str, Any]) -> JointSpec:
-    """Limits, dry friction and armature of a joint."""
-    data: dict[str, Any] = {}
-    if spec.coordinates and "limits" in values:
-        data["limits"] = read_limits(reader, f"{path}.limits", values["limits"], spec.coordinates)
-    if len(spec.coordinates) == 1 and "dry_friction" in values:
-        data["dry_friction"] = read_dry_friction(reader, f"{path}.dry_friction", values["dry_friction"])
-    if len(spec.coordinates) == 1 and "armature" in values:
-        data["armature"] = JOINT_DATA["armature"].read(reader, f"{path}.armature", values["armature"])
-    return replace(spec, **data) if data else spec
-
-
-def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
-    """The joint itself, with its options; keys are checked."""
-    fields = joint_fields(type_name)
-    others = set[str]().union(*map(joint_fields, JOINTS)) if entry.values.keys() - fields.keys() else ()
-    check_keys(entry.path, entry.values, fields, reader.faults, f"a {type_name} joint", others)
-    if {"coordinate", "coordinates"} <= entry.values.keys():
-        reader.fault(f"{entry.path}.coordinates", "coordinate is given too", "leave out one of them", "EG-CONFLICT")
-    kind = JOINTS[type_name]
-    options: dict[str, Any] = {}
-    for option in kind.options:
-        if isinstance(fields[option], Scalar):  # its names are not all known yet
-            options[option] = fields[option].absent(reader)
-        else:
-            value = entry.values.get(option, fields[option].default)
-            options[option] = fields[option].read(reader, f"{entry.path}.{option}", value)
-    if options.get("rotation") == "euler_parameters" and "sequence" in entry.values:
-        remedy = "leave out sequence, or choose rotation: euler_angles"
-        reader.fault(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy, "EG-CONFLICT")
-    return kind(**options)
-
-
-def _with_expressions(reader: Reader, declared: Declared) -> Joint:
-    """The joint with those of its options that are expressions."""
-    joint, values = declared.joint, declared.entry.values
-    result = {
-        option: field.read(reader, f"{declared.entry.path}.{option}", values[option], declared.coordinates[: field.own])
-        for option, field in joint.options.items()
-        if isinstance(field, Scalar) and option in values
-    }
-    return replace(joint, **result)
 
 
 # -- forces and constraints --------------------------------------------------------------------------------------------
@@ -299,7 +214,10 @@ def element_states(
 
 
 def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
-    """The type, if the entry has one and says in one way what it acts on; its keys are checked."""
+    """The type, if the entry has one and says in one way what it acts on; its keys are checked.
+
+    Of a joint a key that other joints have is reported as such.
+    """
     if e.at_fault():
         return None
     raw = e.reader.type_of(e.path, e.values, types, what)
@@ -309,7 +227,8 @@ def _type_of(e: Entry, what: str, types: Types) -> ElementType | None:
     if _misunderstood(e, result):
         return None
     e.element_type, e.fields = result, result.fields(what, types)
-    check_keys(e.path, e.values, e.fields, e.reader.faults)
+    others = {key for one in types.values() for key in one.keys} if what == "joint" else ()
+    check_keys(e.path, e.values, e.fields, e.reader.faults, f"a {raw} joint", others)
     present = [key for key in result.one_of if key in e.values]
     if result.one_of and len(present) != 1:
         message = f"{' or '.join(result.one_of)} is missing"

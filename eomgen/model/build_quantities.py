@@ -12,8 +12,9 @@ from ..base.operations import OPERATIONS
 from ..base.value_rules import POSITIVE
 from ..elements import kinds
 from ..elements.constraints import Constraint
-from ..elements.constraints.switching import event_of, is_switched, state_of
+from ..elements.constraints.switching import SWITCHING, event_of, is_switched, state_of
 from ..elements.dimensions import NONE
+from ..elements.element_type import Entry
 from ..elements.kinds import LAW, MOTION, OUTPUT, Fields
 from ..expr.core import LEAVES, Expr, is_comparison, reachable, substitute, symbols_of
 from ..expr.texts import quoted, shown
@@ -191,11 +192,9 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
         if is_comparison(expression):
             message, remedy = "is a comparison, which has no zero", "give the difference of its sides: a - b for a > b"
             reader.fault(f"{path}.expression", message, remedy, "EG-EVENT")
-    direction = values.get("direction", 0)
-    if not is_number(direction) or direction not in (-1, 0, 1):
-        remedy = "give 1 for a rising, -1 for a falling value, 0 for both"
-        reader.fault(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
-        direction = 0
+    e = Entry(reader, str(entry.name), path, values)
+    e.fields = EVENT
+    direction = e["direction"]
     reset = _reset(reader, f"{path}.reset", {} if values.get("reset") is None else values["reset"])
     restitution = None
     if values.get("restitution") is not None:
@@ -208,10 +207,9 @@ def _event(reader: Reader, entry: DescribedEntry) -> Event:
             message = "with a restitution only a falling value (a gap that closes) is an impact"
             reader.fault(f"{path}.direction", message, "give -1, or leave it out", "EG-EVENT")
         direction = -1
-    doc = reader.text(f"{path}.doc", values.get("doc", ""))
-    terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
+    doc, terminal = e["doc"], e["terminal"]
     friction, slip = _friction(reader, path, values)
-    return Event(str(entry.name), expression, terminal, int(direction), reset, restitution, doc, friction, slip)
+    return Event(e.name, expression, terminal, direction, reset, restitution, doc, friction, slip)
 
 
 def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[float | None, tuple[str, ...]]:
@@ -236,7 +234,7 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
     names = [slip] if isinstance(slip, str) else items(slip)
     outputs = [*reader.names.of("output")]
     if names is None or not 1 <= len(names) <= 2 or not all(isinstance(name, str) for name in names):
-        reader.wrong(f"{path}.slip", slip, kinds.SomeNames)
+        reader.wrong(f"{path}.slip", slip, EVENT["slip"])
         return None, ()
     for name in names:
         if name not in outputs:
@@ -247,15 +245,6 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
                 f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit", "EG-UNIT"
             )
     return friction, tuple(names)
-
-
-def _times(reader: Reader, path: str, value: Any) -> int:
-    if isinstance(value, bool) or value is None:
-        return int(bool(value))
-    if isinstance(value, int) and value > 0:
-        return value
-    reader.wrong(path, value, kinds.Times)
-    return 0
 
 
 def check_resets(
@@ -470,10 +459,7 @@ def _released(reader: Reader, entry: DescribedEntry, names: Sequence[str]) -> li
     path, raw = f"{entry.path}.releases", entry.values.get("releases")
     if raw is None:
         return []
-    listed = [raw] if isinstance(raw, str) else items(raw)
-    if listed is None:
-        reader.wrong(path, raw, kinds.SomeNames)
-        return []
+    listed = SWITCHING["releases"].read(reader, path, raw) or []
     for k, name in enumerate(listed):
         if name not in names or name == entry.name:
             remedy = nearest(str(name), [n for n in names if n != entry.name], "that close and open")

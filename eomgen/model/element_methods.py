@@ -5,19 +5,10 @@ from __future__ import annotations
 from types import MethodType
 from typing import Any
 
-from ..elements.constraints import CONSTRAINTS
 from ..elements.element_type import ElementType
-from ..elements.forces import FORCES
-from ..elements.joints import JOINTS
-from .fields import BODY, EVENT, FUNCTION, INPUT, OUTPUT_FIELDS, PARAMETER, SOLID, STATE, joint_type
+from .fields import BODY, ELEMENTS, EVENT, FUNCTION, INPUT, OUTPUT_FIELDS, PARAMETER, SOLID, STATE
 from .handles import Described, JointHandle, References
 from .methods import method_of
-
-
-def tables() -> dict[str, dict[str, ElementType]]:
-    """Section -> its types, those that were added to the tables after eomgen's own among them."""
-    return {"joints": {name: joint_type(name) for name in JOINTS}, "forces": FORCES, "constraints": CONSTRAINTS}
-
 
 #: Section of single entries -> the method that adds one, and its keys in the order of arguments.
 ENTRIES = {
@@ -67,7 +58,7 @@ ENTRIES = {
 def methods() -> dict[str, list[ElementType]]:
     """Section -> what its methods add."""
     return {section: [one] for section, one in ENTRIES.items()} | {
-        s: [*types.values()] for s, types in tables().items()
+        s: [*types.values()] for s, types in ELEMENTS.items()
     }
 
 
@@ -101,7 +92,7 @@ class ElementMethods(Described):
 
     def _method(self, name: str) -> Any:
         """The method of a type that was added to the tables later; None if there is none."""
-        for section, types in tables().items():
+        for section, types in ELEMENTS.items():
             if name in types:
                 return MethodType(method_of(section, types[name]), self)
         return None

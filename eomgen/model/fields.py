@@ -5,21 +5,17 @@ This one table drives the check of Python calls, the keys of model files and the
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..base.value_rules import NOT_NEGATIVE
 from ..contact import CONTACTS
 from ..elements import kinds as k
 from ..elements.constraints import CONSTRAINTS
-from ..elements.constraints.switching import SWITCHING
-from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, REACH, TIME, Dimension
+from ..elements.dimensions import ACCELERATION, ENERGY, LENGTH, MASS, NONE, TIME, Dimension
 from ..elements.dimensions import INERTIA as MOMENT_OF_INERTIA
-from ..elements.element_type import ElementType, Types
+from ..elements.element_type import Types
 from ..elements.forces import FORCES
-from ..elements.joints import JOINTS
-from ..elements.kinds import LIMITS as LIMITS
+from ..elements.joints import JOINTS, LATEX
 from ..elements.kinds import MARKER, Fields, Schema, Table, definitions, object_schema, ref, table_schema, typed_schema
 from ..elements.kinds import PLACED as PLACED
 from ..elements.solids import SOLIDS
@@ -36,13 +32,15 @@ TABLES = {
 # Contact stands before muscles, creep and tyres in lists of types.
 FORCES |= CONTACTS | {name: FORCES.pop(name) for name in ("muscle", "creep", "tyre")}
 
+#: Section of elements -> its types.
+ELEMENTS: dict[str, Types] = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}
+
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4", "moreau")
 FIXED_STEP = ("RK4", "moreau")  #: methods whose steps are of one size
 
 _UNIT = k.Unit("unit of the value, such as mm or N*m/rad; the value is converted to SI", default="")
 _DOC = k.Text("one sentence, shown in reports", default="")
 _LATEX = k.Latex("how formulas and plots print it, in LaTeX (from its name unless given)", default="")
-_LATEXES = k.Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
 _NAME = k.Name("name of the model and of the generated module", required=True)
 
 PARAMETER: Fields = {
@@ -206,27 +204,6 @@ BODY: Fields = {
 }
 GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 
-JOINT: Fields = {
-    "type": k.Choice("type of the joint", required=True, choices=tuple(JOINTS)),
-    "between": k.Pair(
-        "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P", required=True
-    ),
-}
-AXIS = k.Axis("axis of the joint, in both markers", default="z")
-AXIS_PAIR = k.TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
-COORDINATE = k.CoordinateName("name of the coordinate (the joint's name unless given)")
-COORDINATES = k.CoordinateNames("names of the coordinates, in order")
-#: Data of a joint that has coordinates; the last only where it has one.
-JOINT_DATA: Fields = {
-    "limits": k.Limits("limits of the coordinate; a run that passes one warns, but nothing stops there"),
-    "dry_friction": k.Number("Coulomb friction (N m or N); stored, but it does not act"),
-    "armature": k.Scalar(
-        "inertia of the drive, referred to the coordinate (kg m^2 or kg)",
-        dimension=ENERGY.times(TIME, 2).times(REACH, -2),
-        allowed=NOT_NEGATIVE,
-        remedy="an inertia must be 0 or positive",
-    ),
-}
 LAGRANGIAN: Fields = {
     "coordinates": k.CoordinateNames("generalized coordinates, in order", required=True),
     "expression": k.Scalar("L(q, q_dot, t) = T - V", required=True, level=k.MOTION, dimension=ENERGY),
@@ -237,7 +214,7 @@ LAGRANGIAN: Fields = {
     "constraints": k.Scalars(
         "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=k.MOTION
     ),
-    "latex": _LATEXES,
+    "latex": LATEX,
 }
 EQUATIONS: Fields = {
     "coordinates": k.CoordinateNames("generalized coordinates q, in order", required=True),
@@ -252,7 +229,7 @@ EQUATIONS: Fields = {
     "multipliers": k.Names("names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
     "kinetic_energy": k.Scalar("kinetic energy (J)", default=0, level=k.MOTION, dimension=ENERGY),
     "potential_energy": k.Scalar("potential energy (J)", default=0, level=k.MOTION, dimension=ENERGY),
-    "latex": _LATEXES,
+    "latex": LATEX,
 }
 SIMULATION: Fields = {
     "end": k.PositiveNumber("end time (s)", default=Simulation.end),
@@ -309,50 +286,19 @@ ADDED: Fields = {
     "guess": k.Values("rough coordinates, by names within the component"),
 }
 
+#: Section of single entries -> their keys.
+SINGLE = {"bodies": BODY, "parameters": PARAMETER, "inputs": INPUT, "states": STATE}
+SINGLE |= {"outputs": OUTPUT_FIELDS, "events": EVENT}
 #: Sections whose entries may be written as one value: section -> the key it stands for.
 SHORT = {"parameters": "value", "inputs": "value", "states": "rate", "outputs": "expression", "events": "expression"}
 
 
-def joint_type(type_name: str) -> ElementType:
-    """One joint type as the type of an element."""
-    text = " ".join((inspect.getdoc(JOINTS[type_name]) or "").partition("\n\n")[0].split())
-    keys = {key: field for key, field in joint_fields(type_name).items() if key != "type"}
-    doc = f"a joint of type {type_name}: {text}".replace(", removes", " of 6 degrees of freedom, removes")
-    doc = doc.replace(". Allows", ".  Allows")
-    return ElementType(type_name, doc, keys, ends=("predecessor", "successor"))
-
-
-def joint_fields(type_name: str) -> Fields:
-    """The keys of one joint type."""
-    joint = JOINTS[type_name]
-    fields = JOINT | {key: field for key, field in joint.options.items() if field.required}
-    if joint.has_axis:
-        fields["axis"] = AXIS
-    if joint.has_axes:
-        fields["axes"] = AXIS_PAIR
-    if len(joint.coordinates) == 1:
-        fields["coordinate"] = COORDINATE
-    fields |= {key: field for key, field in joint.options.items() if key != "rotation"}
-    if joint.coordinates:
-        fields["coordinates"] = COORDINATES
-        fields |= joint.options  # in the order of the arguments
-        fields["limits"] = JOINT_DATA["limits"]
-    if len(joint.coordinates) == 1:
-        fields |= JOINT_DATA
-    if joint.coordinates:
-        fields["latex"] = _LATEXES
-    return fields | SWITCHING if joint.coordinates or type_name == "weld" else fields
-
-
 def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     """The keys of an entry of a section; empty for a type that is not known."""
-    kind = values.get("type")
-    types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
-    if types is not None and isinstance(kind, str) and kind in types:
-        return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
-    own: dict[str, Fields] = {"bodies": BODY, "parameters": PARAMETER, "inputs": INPUT, "states": STATE}
-    own |= {"outputs": OUTPUT_FIELDS, "events": EVENT}
-    return own.get(section, {})
+    types, kind = ELEMENTS.get(section), values.get("type")
+    if types is not None:
+        return types[kind].fields(section[:-1], types) if isinstance(kind, str) and kind in types else {}
+    return SINGLE.get(section, {})
 
 
 def acts_on_length(section: str, values: Mapping[str, Any], field: k.Field, is_length: Callable[[str], bool]) -> bool:
@@ -415,10 +361,8 @@ def model_schema() -> dict[str, Any]:
     entries: Schema = {
         "functions": {"oneOf": [typed_schema(function_fields(name), name) for name in FUNCTION]},
         "bodies": _body(),
-        "joints": {"oneOf": [typed_schema(joint_fields(name), name) for name in JOINTS]},
-        "forces": {"oneOf": [_element("force", FORCES, name) for name in FORCES]},
+        **{key: {"oneOf": [_element(key[:-1], types, name) for name in types]} for key, types in ELEMENTS.items()},
         "contacts": _contacts(),
-        "constraints": {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]},
         "add": table_schema(ADDED),
         **{section: _short(section, fields_of(section, {})) for section in SHORT},
     }

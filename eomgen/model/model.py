@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
 from ..base.files import write_whole
 from ..base.names import hint
-from ..elements.constraints import CONSTRAINTS
-from ..elements.forces import FORCES
-from ..elements.joints import JOINTS
 from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
 from .build_functions import FallbackSource
 from .build_mechanism import build
@@ -19,6 +17,7 @@ from .components import Component, Instance, add_instance, component_of, named_a
 from .description import GROUND_NAME, SECTIONS, Description, Faults, items, model_html
 from .element_methods import ElementMethods
 from .equations import describe_equations, describe_lagrangian
+from .fields import ELEMENTS
 from .handles import (
     BodyHandle,
     Described,
@@ -518,10 +517,8 @@ class Builder(ElementMethods):
 
     def _near(self, name: str) -> str:
         """A suggestion for a name that does not exist."""
-        known = (*dir(type(self)), *JOINTS, *FORCES, *CONSTRAINTS)
-        return hint(name, [n for n in known if not n.startswith("_")]) or (
-            f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCES)}; constraints: {', '.join(CONSTRAINTS)}"
-        )
+        known = [n for n in (*dir(type(self)), *chain(*ELEMENTS.values())) if not n.startswith("_")]
+        return hint(name, known) or "; ".join(f"{section}: {', '.join(types)}" for section, types in ELEMENTS.items())
 
     def _counts(self) -> str:
         counts = ((section, len(self._description.sections[section])) for section in SECTIONS)

@@ -459,7 +459,7 @@ class Reader:
         point = Marker(len(self.mass_data) + len(bodies), Frame(self.identity, o), name)
         coordinate = self.contacts[entry.path]
         bodies.append(Body(name, self.graph.zero, o, (o, o, o)))
-        joints.append(JointSpec(name, JOINTS["revolute"](), cam, point, (coordinate,), False))
+        joints.append(JointSpec(name, JOINTS["revolute"].kind(), cam, point, (coordinate,), False))
         return point, self.graph.symbol(coordinate)
 
 

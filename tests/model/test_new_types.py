@@ -18,7 +18,7 @@ from eomgen.elements.element_type import element, key
 from eomgen.elements.forces import FORCES, View
 from eomgen.elements.forces.paths import LINE, PathForce
 from eomgen.elements.frames import Marker
-from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint
+from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint, joint
 from eomgen.elements.kinds import MarkerReference, Scalar
 from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
 from eomgen.expr import vectors as vec
@@ -104,7 +104,7 @@ class Level(Constraint):
 def added(monkeypatch: pytest.MonkeyPatch) -> None:
     spring = element(HardeningSpring, "hardening_spring", "a spring that hardens.", LINE)
     monkeypatch.setitem(FORCES, "hardening_spring", spring)
-    monkeypatch.setitem(JOINTS, "slanted", Slanted)
+    monkeypatch.setitem(JOINTS, "slanted", joint(Slanted))
     monkeypatch.setitem(CONSTRAINTS, "level", element(Level, "level", "a marker that stays at a height."))
 
 

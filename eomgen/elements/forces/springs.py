@@ -117,10 +117,10 @@ class BodyTorque(Force):
 def _torque(e: Entry) -> Force | None:
     if "joint" in e.values:
         e.refuse("axes", "a torque on a joint's coordinate has no axes")
-        path, value = read_coordinate(e), e.read("value", Scalar)
+        path, value = read_coordinate(e), e.read("value", kind=Scalar)
         return None if path is None else Actuator(e.name, path, value)
     marker = e["body"]
-    vector, axes = e.read("value", Vector), e["axes"]
+    vector, axes = e.read("value", kind=Vector), e["axes"]
     return None if marker is None else BodyTorque(e.name, marker, vector, axes)
 
 
