@@ -62,12 +62,14 @@ def _assemble_start(equations: Derivation) -> list[str]:
     """
     mechanism = equations.kinematics.mechanism
     known = {*equations.kinematics.names, *equations.kinematics.loop_coordinates.names}
-    rates = [name for name in mechanism.initial if name not in known]  # which contradict nothing in an open tree
-    more = [*mechanism.initial_outputs, *(rates if equations.kinematics.constraints.labels else ())]
+    rates = [
+        name for name in mechanism.defaults.initial if name not in known
+    ]  # which contradict nothing in an open tree
+    more = [*mechanism.defaults.initial_outputs, *(rates if equations.kinematics.constraints.labels else ())]
     if not more and not equations.mobility.driven:
         return []
     try:
-        wanted = [*OF_STARTS, *(OF_OUTPUTS if mechanism.initial_outputs else ())]
+        wanted = [*OF_STARTS, *(OF_OUTPUTS if mechanism.defaults.initial_outputs else ())]
         module = BoundModel(compile_core(equations, "numpy", wanted))
     except EomgenError as error:
         first_line = str(error).splitlines()[0]

@@ -123,5 +123,5 @@ def _with_notes(model: Model) -> Model:
     bodies = model.description.sections["bodies"]
     if "note" in (model.check_inertia, *(entry.values.get("check_inertia") for entry in bodies)):
         with suppress(ModelError):
-            model.description.notes += model.mechanism().notes
+            model.description.notes += model.mechanism().presentation.notes
     return model

@@ -75,7 +75,7 @@ def describe_start(kinematics: Kinematics) -> dict[str, Any]:
     model, which no tape can play, with the places of their parameters.
     """
     m = kinematics.mechanism
-    sources = {"initial": m.initial, "initial_outputs": m.initial_outputs, "guess": m.guess}
+    sources = {key: getattr(m.defaults, key) for key in ("initial", "initial_outputs", "guess")}
     values = {p.name: p.value for p in m.parameters}
     result: dict[str, Any] = {key: initial_values(kinematics, values, key) for key in sources}
     if bad := [(key, name) for key, of in result.items() for name, x in of.items() if not isfinite(x)]:
@@ -196,13 +196,13 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     rows, n, forces = mobility.independent_rows, len(velocities), [terms.force for terms in kinematics.forces]
     used = symbols_of([*c.values, *c.velocity])
     starts = [*c.aligned, *loop.values, *loop.rates, kinematics.length_scale, *row_scales(kinematics)]
-    starts += [*m.initial.values(), *m.initial_outputs.values(), *m.guess.values()]
+    starts += [*m.defaults.initial.values(), *m.defaults.initial_outputs.values(), *m.defaults.guess.values()]
     names_of_start = used | symbols_of(starts)
     shapes = [[force.name, shape] for force in m.forces for shape in force.met_shapes()]
     independent = [*independent_places(kinematics, mobility), *range(n, n + len(states))]
     return {
         "name": m.name,
-        "doc": m.doc,
+        "doc": m.presentation.doc,
         "method": equations.method,
         "q_names": list(names),
         "v_names": [*velocities, *states],
@@ -242,15 +242,15 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "u_values": [u.value for u in m.inputs],
         "units": units,
         "docs": docs,
-        "latex": dict(m.latex),
-        "instances": dict(m.instances),
+        "latex": dict(m.presentation.latex),
+        "instances": dict(m.presentation.instances),
         "independent": independent,
         "independent_rows": list(rows),
         "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],
         "q_reference": list(mobility.q_reference),
         **describe_start(kinematics),
         "length_scale": mobility.length_scale,
-        "limits_told": m.limits_told,
+        "limits_told": m.defaults.limits_told,
         "limits": {
             name: dict(limits)
             for j in m.joints
@@ -270,11 +270,11 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **(describe_contacts(kinematics) if shapes else {}),
         "picture": describe_picture(m),
         "simulation": {
-            "end": m.simulation.end,
-            "method": m.simulation.method,
-            "rtol": m.simulation.rtol,
-            "atol": m.simulation.atol,
-            **({} if m.simulation.step is None else {"step": m.simulation.step}),
+            "end": m.defaults.simulation.end,
+            "method": m.defaults.simulation.method,
+            "rtol": m.defaults.simulation.rtol,
+            "atol": m.defaults.simulation.atol,
+            **({} if m.defaults.simulation.step is None else {"step": m.defaults.simulation.step}),
             **_longest_step(kinematics),
         },
     }

@@ -148,12 +148,12 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
                 "color": s.color,
                 **n.frame(s.frame),
             }
-            for s in mechanism.body_shapes
+            for s in mechanism.presentation.body_shapes
         ],
-        "markers": [{"name": marker.label, **n.marker(marker)} for marker in mechanism.named_markers],
+        "markers": [{"name": marker.label, **n.marker(marker)} for marker in mechanism.presentation.named_markers],
         "joints": joints,
         "elements": elements,
-        "hidden": list(mechanism.added_bodies),
+        "hidden": list(mechanism.presentation.added_bodies),
     }
     return {**data, "tape": list(record_tape(n.kept, n.places.__getitem__))}
 

@@ -346,9 +346,9 @@ class Sign(Field):
     schema = enum(1, -1, 0)
 
     def read(self, reader: Any, path: str, value: Any) -> int:
-        number = value.item() if getattr(value, "shape", None) == () else value
-        if isinstance(number, Real) and not isinstance(number, bool) and number in (-1, 0, 1):
-            return int(number)
+        number: Any = value.item() if getattr(value, "shape", None) == () else value
+        if number is not True and number is not False and isinstance(number, Real) and number in (-1, 0, 1):
+            return int(float(number))
         remedy = "give 1 for a rising, -1 for a falling value, 0 for both"
         reader.fault(path, f"{value!r} is not 1, -1 or 0", remedy, "EG-CHOICE")
         return 0

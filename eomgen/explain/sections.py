@@ -32,8 +32,8 @@ def mechanism(author: Author, module: Any | None) -> Section:
     """DrawnPicture, topology, joints and loops."""
     m = author.mechanism
     pieces: list[Piece] = []
-    if m.doc:
-        pieces.append(Sentence(_plain(m.doc)))
+    if doc := m.presentation.doc:
+        pieces.append(Sentence(_plain(doc)))
     if m.bare:
         kind = "a Lagrangian" if m.lagrangian is not None else "equations of motion"
         pieces.append(Sentence(f"The model is {kind}, so there are no bodies to draw."))

@@ -217,7 +217,7 @@ def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
     """The initial values, and a place beside them where nothing vanishes by chance."""
     graph, m = kinematics.graph, kinematics.mechanism
     inputs = {graph.symbol(u.name): graph.constant(u.value) for u in m.inputs}
-    declared = {**m.guess, **m.initial}
+    declared = {**m.defaults.guess, **m.defaults.initial}
     known = dict(zip(declared, substitute(list(declared.values()), inputs), strict=True))
     unit = {"length": kinematics.length_scale, "angle": graph.one}
     first: dict[Expr, Expr] = {}

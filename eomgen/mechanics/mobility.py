@@ -170,7 +170,7 @@ def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
 
 def _follow(system: ConstraintSystem, q: Array, functions: ConstraintFunctions) -> list[tuple[float, Array]]:
     """Closed positions at times after 0, a small motion apart."""
-    end = functions.kinematics.mechanism.simulation.end
+    end = functions.kinematics.mechanism.defaults.simulation.end
     continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
     continuation.step = FIRST
     continuation.to(1.0, steps=STEPS)
@@ -357,7 +357,7 @@ def initial_values(
     kinematics: Kinematics, values: Mapping[str, float | None], which: str = "initial"
 ) -> dict[str, float]:
     """Declared initial values (or guesses) as numbers, by name, with those of parameters."""
-    wanted: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
+    wanted: Mapping[str, Expr] = getattr(kinematics.mechanism.defaults, which)
     numbers = Evaluator(list(wanted.values()), tuple(values))(list(values.values())) if wanted else []
     return {name: float(x) for name, x in zip(wanted, numbers, strict=True)}
 

@@ -59,7 +59,7 @@ def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str,
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
     initial = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
     kinds = dict(zip(kinematics.names, kinematics.kinds, strict=True))
-    guessed = [name for name in mechanism.guess if name in known and kinds.get(name) != "parameter"]
+    guessed = [name for name in mechanism.defaults.guess if name in known and kinds.get(name) != "parameter"]
     held = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
     at = dict(zip(kinematics.names, mobility.q_reference, strict=True))
     held |= {name: at[name] for name in mobility.independent if name in at}
@@ -101,9 +101,9 @@ SHOWN = 6
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     """Locked and overconstrained mechanisms, change points, badly chosen independent coordinates."""
     m = kinematics.mechanism
-    notes = list(m.notes)
+    notes = list(m.presentation.notes)
     moved = mobility.driven or m.forces or m.inputs or m.switched
-    if m.default_gravity and not moved and any(not body.mass.is_zero for body in m.bodies):
+    if m.presentation.default_gravity and not moved and any(not body.mass.is_zero for body in m.bodies):
         notes.append(
             "gravity is 0 by default and no force acts, so only inertia changes the motion; set gravity, or "
             "confirm with gravity (0, 0, 0)"
@@ -179,7 +179,7 @@ def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     m, at = kinematics.mechanism, dict(zip(kinematics.names, mobility.q_reference, strict=True))
     declared = [pair for j in m.joints for pair in zip(j.coordinates, j.limits, strict=False)]
     result = []
-    for name, limits in declared if m.limits_told and not mobility.assumed else ():
+    for name, limits in declared if m.defaults.limits_told and not mobility.assumed else ():
         for key, limit in limits:
             beyond = {"lower": limit - at.get(name, limit), "upper": at.get(name, limit) - limit}.get(key, 0.0)
             if beyond > SLACK * (1.0 + abs(limit)):

@@ -178,7 +178,7 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)
     rates = {n for spec in joints for n, v in zip(spec.velocities, spec.joint.velocities, strict=True) if v.of is None}
-    declared = rates.intersection(mechanism.initial)
+    declared = rates.intersection(mechanism.defaults.initial)
     declared |= {str(c.coordinate.node[1]) for c in mechanism.constraints if isinstance(c, CoordinateDriver)}
     rank = [_rank(spec, independent, declared) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))

@@ -55,7 +55,7 @@ from .equations import (
 )
 from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
-from .mechanism import Body, Mechanism, Simulation
+from .mechanism import Body, Mechanism, Presentation, RunDefaults, Simulation
 from .names import Namespace, fault_of_model_name
 from .quantities import SUMS, ReactionQuantity, WrenchQuantity
 from .read_shapes import read_shapes
@@ -146,6 +146,9 @@ def build(description: Description) -> Mechanism:
     if faults:
         raise ModelError(faults.sorted())
     outputs = with_units(reader, joints, outputs)
+    initial = begun | {s.state: graph.one if s.closed else graph.zero for s in switched}
+    initial |= {name: value for name, value in starts.items() if name in moving}
+    others = {name: value for name, value in starts.items() if name not in moving}
     exerted, reactions = _wrenches(reader)
     described = len(bodies)
     bodies, joints = (*bodies, *reader.added[0]), (*joints, *reader.added[1])
@@ -167,35 +170,31 @@ def build(description: Description) -> Mechanism:
         | state_rates,
         wrench_quantities=exerted,
         reaction_quantities=reactions,
-        initial=begun
-        | {s.state: graph.one if s.closed else graph.zero for s in switched}
-        | {name: value for name, value in starts.items() if name in moving},
-        initial_outputs={name: value for name, value in starts.items() if name not in moving},
-        guess=guess,
         independent=independent,
-        simulation=simulation,
         lagrangian=lagrangian,
         given=raw,
         constraints=constraints,
         switched=switched,
         lines=dict(description.lines),
         written_paths=dict(description.written_paths),
-        doc=doc,
-        latex=dict(reader.latex),
-        instances=dict(description.instances),
         check_inertia=check_inertia,
-        limits_told=limits_told,
         negative=negative,
-        named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
-        body_shapes=tuple(
-            shape
-            for entry in sections["bodies"]
-            for shape in read_body_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
-        ),
-        added_bodies=tuple(range(described, len(bodies))),
-        default_gravity="gravity" not in values,
-        notes=inertia_notes,
         requirements=tuple(reader.requirements.all),
+        defaults=RunDefaults(initial, others, guess, simulation, limits_told),
+        presentation=Presentation(
+            doc=doc,
+            latex=dict(reader.latex),
+            instances=dict(description.instances),
+            notes=inertia_notes,
+            default_gravity="gravity" not in values,
+            named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
+            body_shapes=tuple(
+                shape
+                for entry in sections["bodies"]
+                for shape in read_body_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
+            ),
+            added_bodies=tuple(range(described, len(bodies))),
+        ),
     )
 
 

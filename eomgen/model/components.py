@@ -318,9 +318,9 @@ def add_instance(
         note_attachment(name.removeprefix(instance.prefix), f"bodies.{body}.markers.{name}")
     _add_starts(target, component, instance, renaming)
     target.absent |= {f"{instance.prefix}{name}" for name in component.description.absent}
-    for one in component.description.bindings:
-        inner = one._replace(instance=f"{instance.name}.{one.instance}", text=renaming.scalar(one.text))
-        target.bindings.append(inner)
+    for binding in component.description.bindings:
+        whole_name, text = f"{instance.name}.{binding.instance}", renaming.scalar(binding.text)
+        target.bindings.append(binding._replace(instance=whole_name, text=text))
     for name in texts:
         if instance.values.get(name) is not None:
             place = f"{path}.{instance.places.get(name, name)}"

@@ -246,8 +246,33 @@ class Simulation:
 
 
 @dataclass(frozen=True)
+class RunDefaults:
+    """Where a run starts and how it is made where a call does not say so."""
+
+    initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
+    initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
+    guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
+    simulation: Simulation = Simulation()
+    limits_told: bool = True  #: whether runs that pass a limit of a joint say so
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """What documents and pictures show of a mechanism; nothing is computed from it."""
+
+    doc: str = ""
+    latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given
+    instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix
+    notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
+    default_gravity: bool = False  #: whether the description leaves gravity out
+    named_markers: tuple[Marker, ...] = ()
+    body_shapes: tuple[BodyShape, ...] = ()
+    added_bodies: tuple[int, ...] = ()  #: that no one described: points of contact of cams
+
+
+@dataclass(frozen=True)
 class Mechanism:
-    """What the user said, checked and lowered to one graph."""
+    """What the user said, checked and lowered to one graph: its physics, defaults of runs, and what is shown of it."""
 
     name: str
     graph: Graph
@@ -265,29 +290,18 @@ class Mechanism:
     element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
     wrench_quantities: Mapping[str, WrenchQuantity] = field(default_factory=dict)  #: by symbol
     reaction_quantities: Mapping[str, ReactionQuantity] = field(default_factory=dict)  #: by symbol
-    initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
-    initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
-    guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     independent: tuple[str, ...] = ()
-    simulation: Simulation = Simulation()
     given: GivenEquations | None = None  #: instead of bodies
     lagrangian: Lagrangian | None = None  #: of which these are the derivatives, for reading
     constraints: tuple[Constraint, ...] = ()
     switched: tuple[Switched, ...] = ()  #: constraints that close and open, which are not among those
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     written_paths: Mapping[str, str] = field(default_factory=dict)  #: dotted path -> as the user wrote it, for messages
-    doc: str = ""
-    latex: Mapping[str, str] = field(default_factory=dict)  #: how names are printed, where it is given
-    instances: Mapping[str, str] = field(default_factory=dict)  #: of components: name -> prefix, for display
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
-    limits_told: bool = True  #: whether runs that pass a limit of a joint say so
-    default_gravity: bool = False  #: whether the description leaves gravity out
     negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
-    named_markers: tuple[Marker, ...] = ()  #: for pictures
-    body_shapes: tuple[BodyShape, ...] = ()  #: for pictures
-    added_bodies: tuple[int, ...] = ()  #: that no one described: points of contact of cams
-    notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
     requirements: tuple[Requirement, ...] = ()  #: rules that parameters keep, whatever their values are
+    defaults: RunDefaults = RunDefaults()
+    presentation: Presentation = Presentation()
 
     @property
     def bare(self) -> bool:
@@ -337,9 +351,8 @@ class Mechanism:
 #: Attributes that nothing is computed from.
 ASIDE = frozenset(
     (
-        *("doc", "docs", "latex", "instances", "lines", "written_paths", "notes", "place", "graph", "functions"),
-        *("file", "requirements", "named_markers", "body_shapes", "added_bodies", "limits_told", "default_gravity"),
-        *("of_velocities",),
+        *("doc", "docs", "latex", "lines", "written_paths", "place", "graph", "functions", "file", "requirements"),
+        *("presentation", "limits_told", "of_velocities"),
     )
 )
 #: What counts of a key of a joint's own, and how its kind is spelled: digests are compared over versions.
@@ -410,7 +423,8 @@ def _spell(value: Any, graph: Graph, known: dict[int, str]) -> Any:
 def _fields(value: Any) -> dict[str, Any]:
     """The attributes of an object; of a dataclass its fields alone, as others may have been looked up since."""
     if (declared := getattr(value, "__dataclass_fields__", None)) is not None:
-        return {name: getattr(value, name) for name in declared}
+        fields = {name: getattr(value, name) for name in declared}
+        return fields | _fields(fields.pop("defaults")) if isinstance(value, Mechanism) else fields
     slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
     result = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
     return {**result, **getattr(value, "__dict__", {})}

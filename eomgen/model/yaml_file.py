@@ -470,11 +470,13 @@ def plain_description(raw: Description) -> Description:
         section: [replace(entry, values=plain(entry.values, functions)) for entry in entries]
         for section, entries in description.sections.items()
     }
-    values, places = (
-        plain(description.values, functions),
-        {"origins": dict(raw.origins), "bindings": list(raw.bindings)},
+    return Description(
+        values=plain(description.values, functions),
+        sections=sections,
+        instances=dict(raw.instances),
+        origins=dict(raw.origins),
+        bindings=list(raw.bindings),
     )
-    return Description(values=values, sections=sections, instances=dict(raw.instances), **places)
 
 
 def plain(value: Any, functions: Names = frozenset()) -> Any:

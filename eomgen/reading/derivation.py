@@ -131,7 +131,7 @@ def derive_mechanism(
     seconds = {"describe": described}
     chosen = choose_method(mechanism, method)
     with without_gc(), timed(seconds, "kinematics"):
-        plain = Undotted(mechanism.instances).coordinate  # leg.hip of an instance is leg_hip
+        plain = Undotted(mechanism.presentation.instances).coordinate  # leg.hip of an instance is leg_hip
         wanted = tuple(map(plain, names_of("independent", independent, "a coordinate")))
         kinematics = analyse(mechanism, wanted)
         mobility = _mobility(kinematics, wanted)

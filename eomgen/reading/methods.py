@@ -42,7 +42,7 @@ def model_notation(kinematics: Kinematics, more: Iterable[str] = ()) -> Notation
     outputs = [output.name for output in m.outputs]
     outputs += m.given.multipliers if m.given is not None else ()
     names = [*k.names, *k.loop_coordinates.names, *k.parameter_names, *k.input_names, *outputs, *rates, *more]
-    return Notation(names, m.latex, m.instances)
+    return Notation(names, m.presentation.latex, m.presentation.instances)
 
 
 def momentum_names(kinematics: Kinematics) -> tuple[str, ...]:

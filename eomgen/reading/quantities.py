@@ -397,7 +397,7 @@ class Quantities:
         mechanism = self.kinematics.mechanism
         own = Frame.identity(self.graph)
         bodies = {body.name: Marker(k, own, body.name) for k, body in enumerate(mechanism.bodies)}
-        return bodies | {marker.label: marker for marker in mechanism.named_markers}
+        return bodies | {marker.label: marker for marker in mechanism.presentation.named_markers}
 
     def pose(self, name: str) -> Rows:
         """Placement of a body or marker in ground axes (4, 4)."""

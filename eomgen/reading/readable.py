@@ -332,7 +332,7 @@ class Readable(ABC):
         """Names of bodies and of named markers."""
         require_bodies(self.kinematics)
         mechanism = self.kinematics.mechanism
-        return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.named_markers))
+        return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.presentation.named_markers))
 
     @quantity(BODIES, by_name=True)
     def poses(self) -> ByName[Any]:
@@ -712,7 +712,7 @@ class Readable(ABC):
 
     def _plain(self, name: str) -> str:
         """``left_hinge`` of ``left.hinge`` in an instance of a component; any other name as it is."""
-        return Undotted(self.kinematics.mechanism.instances).coordinate(name)
+        return Undotted(self.kinematics.mechanism.presentation.instances).coordinate(name)
 
     def _read(self, named: Any, what: str = "symbol") -> dict[str, Any]:
         """Values that a user puts in for names."""

@@ -144,7 +144,8 @@ def _turned(model: CheckedModel, seed: int) -> BoundModel:
         for k in range(len(mechanism.bodies))
     }
     bodies = tuple(_described_in(body, places[k]) for k, body in enumerate(mechanism.bodies))
-    made = _Moved(places).of(replace(mechanism, bodies=(), body_shapes=()))
+    unseen = replace(mechanism.presentation, body_shapes=())
+    made = _Moved(places).of(replace(mechanism, bodies=(), presentation=unseen))
     return _made(replace(made, bodies=bodies), model.equations.method)
 
 
