@@ -215,16 +215,17 @@ class AssemblyFailure(NamedTuple):
                 f"the loops do not close{self._with(raw)}, nor with these values left free "
                 f"({self.restarts + 1} starts tried): {gaps}; {self._advice()}"
             )
-        near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0), 12)
         dof = len(free.free) - rank(free.evaluate(q)[1]).rank
+        y = self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0)
+        near = ", ".join(self._given(q, y, 12 if len(raw) > dof else 6))
         if len(raw) > dof:
             values = f"{len(raw)} value{'s' if len(raw) != 1 else ''}"
             return (
                 f"the given values {', '.join(raw)} are inconsistent: {values} for {dof} "
                 f"degree{'s' if dof != 1 else ''} of freedom, and with all of them held {gaps}; "
-                f"give fewer, or consistent ones such as {', '.join(near)}"
+                f"give fewer, or consistent ones such as {near}"
             )
-        return f"the loops cannot close{self._with(raw)}: {gaps}; a closed position nearby has {', '.join(near)}"
+        return f"the loops cannot close{self._with(raw)}: {gaps}; a closed position nearby has {near}"
 
     def _contradiction(self) -> str:
         """Words for open rows that no position can satisfy together: they depend on each other everywhere."""
