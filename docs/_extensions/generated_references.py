@@ -17,6 +17,7 @@ from sphinx.util.docutils import SphinxDirective
 from eomgen.cli.command import VERBS, eomgen
 from eomgen.elements import kinds
 from eomgen.elements.constraints import CONSTRAINTS
+from eomgen.elements.element_type import Law
 from eomgen.elements.forces import FORCES
 from eomgen.elements.joints import JOINTS
 from eomgen.elements.kinds import Field, Fields
@@ -89,10 +90,17 @@ class Keys(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """The nodes in place of the directive."""
-        lines: list[str] = []
+        lines, known = list[str](), list[tuple[str, list[str]]]()
         for name, text, keys in entries(self.arguments[0]):
             lines += [f"### {name}", "", _sentence(text), ""] if name else []
             lines += keys_table(keys)
+            for key, field in keys.items():
+                for types, one in field.rows() if isinstance(field, Law) else ():
+                    title = f"`{key}` of type {', '.join(f'`{kind}`' for kind in types)}"
+                    again = (title, [*one.keys]) in known
+                    lines += [f"{title}: as above.", ""] if again else [f"{title}: {_cell(one.doc)}", ""]
+                    lines += () if again else keys_table(one.keys)
+                    known.append((title, [*one.keys]))
         return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
 
 

@@ -429,9 +429,10 @@ def _refuse_in_soil(e: Entry, key: str, why: str) -> None:
 def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, Expr | None]] | None:
     """The laws of the normal force and of friction; coefficient of friction and restitution where bodies are rigid."""
     if "soil" in e.values:
-        for part in ("law", "friction"):
-            for key in e.values.get(part, ()):
-                e.fault(f"{part}.{key}", "is of another law than soil", "leave it out")
+        for part in [part for part in ("law", "friction") if part in e.values]:
+            keys = [f"{part}.{key}" for key in e.values[part]] if isinstance(e.values[part], Mapping) else [part]
+            for key in keys:
+                e.fault(key, "is of another law than soil", "leave it out")
         result = e.read_part("soil")
         return None if result is None else (*result, (None, None))
     if "law" not in e.values:
@@ -440,18 +441,17 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, E
     law, rubbing = e.part("law"), e.values.get("friction", {})
     if law is None or law.element_type.read is None:
         return None
-    normal = law.element_type.read(law)
-    restitution = law["restitution"] if "restitution" in law.values else None
-    if law.element_type is not RIGID:
+    normal, rigid = law.element_type.read(law), law.element_type is RIGID
+    restitution = None
+    if "restitution" in law.values and "restitution" in law.fields:  # judged once
+        restitution = law["restitution"] if rigid else law.law("restitution", {})
+    if not rigid:
         friction = e.read_part("friction")
         return None if normal is None else (normal, friction, (getattr(friction, "dynamic", None), restitution))
-    for key in rubbing:
-        if key != "dynamic":
-            e.fault(
-                f"friction.{key}", "has no meaning for rigid bodies, whose friction is a coefficient", "leave it out"
-            )
-    dynamic = FRICTIONS["coulomb"].keys["dynamic"]
-    place = f"{e.path}.friction.dynamic"
+    for key in rubbing.keys() - {"dynamic"}:
+        why = "has no meaning for rigid bodies, whose friction is a coefficient"
+        e.fault(f"friction.{key}", why, "leave it out")
+    dynamic, place = FRICTIONS["coulomb"].keys["dynamic"], f"{e.path}.friction.dynamic"
     coefficient = dynamic.read(e.reader, place, rubbing["dynamic"]) if "dynamic" in rubbing else None
     return None if normal is None else (normal, None, (coefficient, restitution))
 
@@ -567,16 +567,8 @@ def _differ(shapes: Sequence[ContactShape], kind: str) -> bool:
     return len({shape.marker.body for shape in shapes if shape.kind == kind}) > 1
 
 
-_UNDER_PLATES = ("bed", "half_plane", "profile", "smooth_profile", "outline", "smooth_outline", "sprocket")
-_CORNERED = (
-    "box",
-    "polygon",
-    "profile",
-    "smooth_profile",
-    "outline",
-    "smooth_outline",
-    "sprocket",
-)  #: shapes whose corners meet segments
+_UNDER_PLATES = ("bed", "half_plane", *PIECED)
+_CORNERED = ("box", "polygon", *PIECED)  #: shapes whose corners meet segments
 _ALLOWED = (
     "circle, segment, box, polygon, outline, smooth_outline and sprocket meet each other, half_plane, profile and "
     "smooth_profile, which plates meet too; wheels and plates meet a bed; sphere, capsule, ellipsoid and cuboid meet "

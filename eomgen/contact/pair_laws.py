@@ -26,10 +26,10 @@ from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, EdgeRound, HollowArcRound, InnerCornerRound, InsideRound, ProfilePiece
 from .rounds import AtHeight, BlockRound, EdgeEdge, EdgeRod, PolygonRound, RodCorner, RodRod, RoundRound, SegmentRound
-from .shapes import WHOLE_PLATE, greatest
+from .shapes import SHAPES, WHOLE_PLATE, greatest
 from .soil_beds import SoilCell
 from .soil_wheels import SoilWheel
-from .states import BED_CELL, BLOCK, CORE, FIELD, FIELD_SHAPE, INSIDE, POLYGON, FeatureKind, ShapeParts
+from .states import BED_CELL, BLOCK, CORE, FIELD, INSIDE, POLYGON, FeatureKind, ShapeParts
 
 # -- features that meet ------------------------------------------------------------------------------------------------
 
@@ -163,12 +163,6 @@ def turning_radius(kind: str, sizes: Sequence[Expr], graph: Graph) -> Expr:
 PARTS = ("round", "corner", "vertex", "end", "ellipsoid", "rod", "pad", "polygon")
 #: Classes of first parts of which each has states of its own; those of all others are of surfaces.
 _APART = ("round", "rod", POLYGON, "ellipsoid", BLOCK)
-#: Kind of shape -> what it is where it is the first of a pair.
-_FIRST = {
-    "circle": "round", "sphere": "round", "capsule": "rod", "segment": "segment", "box": POLYGON, "polygon": POLYGON,
-    "profile": "edge", "smooth_profile": "edge", "outline": "edge", "smooth_outline": "edge", "sprocket": "edge",
-    "half_plane": "half", "half_space": "half", "ellipsoid": "ellipsoid", "cuboid": BLOCK, FIELD_SHAPE: FIELD,
-}  # fmt: skip
 
 
 class PairStates(NamedTuple):
@@ -220,7 +214,7 @@ def places_of(names: tuple[str, str]) -> int:
 
 
 def _meets(kind: str, first: str, second: str) -> bool:
-    own = _FIRST.get(kind, "")
+    own = SHAPES[kind].first if kind in SHAPES else ""
     return (own, second) in MEETINGS and class_of(own, second) == first
 
 

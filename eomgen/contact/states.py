@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -40,7 +41,6 @@ POINTS = 8  #: most points of a plate
 WHEEL = "wheel"  #: a circle with a width
 BED = "bed"  #: soil that remembers by place, in cells
 BED_CELL = "cell"  #: class of the cells, whose states belong to no pair
-TEETH = 3  #: fewest teeth of a sprocket
 POLYGON = "polygon"  #: class of convex polygons, which meet each other with their edges
 BLOCK = "block"  #: class of cuboids, which spheres and ellipsoids meet
 CORE = "core"  #: class of cuboids with rounded edges, which those of other cuboids and capsules meet
@@ -97,22 +97,17 @@ def _whole(raw: Any) -> int | None:
     return int(value) if value.is_integer() else None
 
 
-def points_of_plate(raw: Mapping[str, Any]) -> int | None:
-    """At how many points a plate is felt; None where that is no number."""
-    count = _whole(raw.get("points", PLATE))
-    return count if count is not None and 1 <= count <= POINTS else None
+#: Kind of shape -> the key that counts its parts, the least and the greatest number, and that where none is given.
+COUNTED = {
+    "plate": ("points", 1, POINTS, PLATE), "bed": ("cells", 1, MOST_PAIRS, None), "sprocket": ("teeth", 3, inf, None),
+}  # fmt: skip
 
 
-def cells_of_bed(raw: Mapping[str, Any]) -> int | None:
-    """How many cells a bed has; None where that is no number."""
-    count = _whole(raw.get("cells"))
-    return count if count is not None and 1 <= count <= MOST_PAIRS else None
-
-
-def teeth_of_sprocket(raw: Mapping[str, Any]) -> int | None:
-    """How many teeth a sprocket has; None where that is no number."""
-    count = _whole(raw.get("teeth"))
-    return count if count is not None and count >= TEETH else None
+def count_of(kind: str, raw: Mapping[str, Any]) -> int | None:
+    """How many parts a shape has; None where that is no such number."""
+    key, least, most, preset = COUNTED[kind]
+    count = _whole(raw.get(key, preset))
+    return count if count is not None and least <= count <= most else None
 
 
 def groups_of_entry(values: Mapping[str, Any]) -> list[list[ShapeParts]]:
@@ -132,12 +127,8 @@ def _shapes_of_entry(value: Any) -> list[ShapeParts]:
         if not isinstance(shape, Mapping):
             continue
         kind = str(shape.get("shape"))
-        if kind == "plate":
-            count = points_of_plate(shape) or 0
-        elif kind == "sprocket":
-            count = teeth_of_sprocket(shape) or 0
-        elif kind == BED:
-            count = cells_of_bed(shape) or 0
+        if kind in COUNTED:
+            count = count_of(kind, shape) or 0
         elif kind == "circle" and "width" in shape:
             kind, count = WHEEL, 1
         else:

@@ -308,8 +308,7 @@ class Law(Field):
         """``preset`` is the type where none is named; ``flat`` are keys of an entry that stand for others of a law."""
         super().__init__(doc, required)
         self.types, self.preset, renamed = types, preset, flat or {}
-        own = {key: key for one in types.values() for key in one.keys if key not in renamed.values()}
-        self.flat = own | renamed
+        self.flat = {key: key for one in types.values() for key in one.keys if key not in renamed.values()} | renamed
 
     def keys_of(self, kind: str) -> Fields:
         """The keys of laws of a type."""
@@ -351,15 +350,15 @@ def law(
 
     ``check`` notes what is wrong with several together, and puts in place of fields what follows from others.
     """
-    own = keys_of(kind)
+    fields = keys_of(kind)
 
     def read(e: Entry) -> Any:
-        values = {key: e[key] for key in own}
+        values = {key: e[key] for key in fields}
         if check is not None:
             check(e, values)
         return None if e.at_fault() else kind(**values)
 
-    return ElementType(name, doc, own | (more or {}), read)
+    return ElementType(name, doc, fields | (more or {}), read)
 
 
 def sort_laws(
@@ -387,11 +386,11 @@ def sort_laws(
         home = next((one for one in homes[1:] if one in present), homes[0])
         name = laws[home].flat.get(key, key)
         if home in rest or name in parts[home]:
-            twice(before + key)
+            twice(f"{before}{key}")
             continue
         parts[home][name] = value
         for one, nested in laws[home].flat.items() if home != "law" or not before else ():
             places.setdefault(f"{home}.{nested}", before + one)
-        places[f"{home}.{name}"] = before + key
+        places[f"{home}.{name}"] = f"{before}{key}"
     result = rest | {key: part for key, part in parts.items() if part}
     return result, {nested: one for nested, one in places.items() if nested != one}

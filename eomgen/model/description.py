@@ -104,9 +104,9 @@ class Description:
         path = f"{section}.{shortened(name)}"
         if home:
             self.written_paths[path] = f"{home}.{shortened(name)}"
-        own = as_written(path, self.written_paths)
-        values, places = sort_laws(keys or {}, values, lambda key: twice(f"{own}.{key}"))
-        self.written_paths.update((f"{path}.{key}", f"{own}.{place}") for key, place in places.items())
+        start = as_written(path, self.written_paths)
+        values, places = sort_laws(keys or {}, values, lambda key: twice(f"{start}.{key}"))
+        self.written_paths.update((f"{path}.{key}", f"{start}.{place}") for key, place in places.items())
         entry = DescribedEntry(name, values, path)
         self.sections[section].append(entry)
         return entry
@@ -174,8 +174,8 @@ class Faults:
 
     def add(self, path: str, message: str, remedy: str = "", code: str = "") -> None:
         """Note a fault at a dotted path."""
-        own = as_written(path, self.written_paths)
-        self.take(Problem(own, message, remedy, *place_of(own, self.lines), code))
+        place = as_written(path, self.written_paths)
+        self.take(Problem(place, message, remedy, *place_of(place, self.lines), code))
         self._mark(path)
 
     def mapping(self, path: str, value: Any, remedy: str) -> Mapping[Any, Any]:

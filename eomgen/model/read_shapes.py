@@ -16,14 +16,10 @@ from ..contact.shapes import ContactShape
 from ..contact.states import (
     BED,
     CORNERS,
-    MOST_PAIRS,
-    POINTS,
+    COUNTED,
     SHAPE_FIELDS,
-    TEETH,
     ContactShapes,
-    cells_of_bed,
-    points_of_plate,
-    teeth_of_sprocket,
+    count_of,
 )
 from ..elements import kinds
 from ..expr.core import Expr
@@ -62,11 +58,8 @@ def outline_sizes(reader: Reader, path: str, raw: Mapping[str, Any], corners: Se
 
 def sprocket_sizes(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr, ...]:
     """Depth, number of teeth, pitch, radii of seats and tips, angle of a seat."""
-    teeth = teeth_of_sprocket(raw)
+    teeth = _count(reader, path, "sprocket", raw)
     if teeth is None:
-        reader.fault(
-            f"{path}.teeth", f"is {shown(raw['teeth'])}", f"give a whole number of {TEETH} or more", "EG-RANGE"
-        )
         return ()
     sizes = _positive(reader, path, raw, "pitch", "seat", "tip_radius")
     sizes.append(reader.expression(f"{path}.seat_angle", raw.get("seat_angle", SEAT_ANGLE)))
@@ -142,10 +135,9 @@ def _sizes(reader: Reader, path: str, kind: str, raw: Mapping[str, Any]) -> tupl
         return None if lengths is None else (*lengths, *(_edge(reader, path, raw, lengths) if kind == "cuboid" else ()))
     if kind == "height_field":
         return _height(reader, path, raw)
-    if kind == BED:
-        return _bed(reader, path, raw)
-    if kind == "plate":
-        return _plate(reader, path, raw)
+    if kind in (BED, "plate"):
+        lengths = _positive(reader, path, raw, *(("length",) if kind == BED else ("length", "width")))
+        return (*lengths, reader.graph.constant(float(_count(reader, path, kind, raw) or 1)))
     names = ("length", "radius") if "length" in SHAPE_FIELDS[kind] else ("radius", *(["width"] * ("width" in raw)))
     sizes = [reader.expression(f"{path}.{name}", raw.get(name, 0)) for name in names]
     for name, x in zip(names, sizes, strict=True):
@@ -188,25 +180,13 @@ def _edge(reader: Reader, path: str, raw: Mapping[str, Any], size: Sequence[Expr
     return (radius,)
 
 
-def _plate(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr, ...]:
-    """Length, width and number of points of a plate."""
-    sizes = _positive(reader, path, raw, "length", "width")
-    count = points_of_plate(raw)
+def _count(reader: Reader, path: str, kind: str, raw: Mapping[str, Any]) -> int | None:
+    """How many parts a shape has; None where that is no such number, which is noted."""
+    count, (key, least, most, _) = count_of(kind, raw), COUNTED[kind]
     if count is None:
-        remedy = f"give a whole number from 1 to {POINTS}"
-        reader.fault(f"{path}.points", f"is {shown(raw['points'])}", remedy, "EG-RANGE")
-    return (*sizes, reader.graph.constant(float(count or 1)))
-
-
-def _bed(reader: Reader, path: str, raw: Mapping[str, Any]) -> tuple[Expr, ...]:
-    """Length and number of cells of a bed."""
-    (length,) = _positive(reader, path, raw, "length")
-    count = cells_of_bed(raw)
-    if count is None:
-        reader.fault(
-            f"{path}.cells", f"is {shown(raw['cells'])}", f"give a whole number from 1 to {MOST_PAIRS}", "EG-RANGE"
-        )
-    return (length, reader.graph.constant(float(count or 1)))
+        remedy = f"give a whole number {f'of {least} or more' if most == math.inf else f'from {least} to {most}'}"
+        reader.fault(f"{path}.{key}", f"is {shown(raw[key])}", remedy, "EG-RANGE")
+    return count
 
 
 def _several(reader: Reader, path: str, value: Any, count: int, lengths: bool = False) -> list[Expr] | None:
