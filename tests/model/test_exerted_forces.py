@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -226,6 +227,48 @@ def test_all_writings_of_a_law_are_one_model(tmp_path: Path, writing: str) -> No
     models += [load(tmp_path, model.to_yaml()) for model in models]
     digests = [m.compile(target="numpy", kernels=["poses"]).metadata["model_digest"] for m in models]
     assert len({*digests}) == 1
+
+
+ONE_BY_ONE = [
+    (
+        {"normal_law": "linear", "stiffness": 1e5, "damping": 3},
+        {"law": {"type": "linear", "stiffness": 1e5, "damping": 3}},
+    ),
+    (
+        {"stiffness": 1e5, "friction": 0.3, "friction_law": "brown_mcphee", "static_friction": 0.4, "transition": 0.1},
+        {"law": {"stiffness": 1e5},
+         "friction": {"type": "brown_mcphee", "dynamic": 0.3, "static": 0.4, "transition": 0.1}},
+    ),
+    (
+        {"stiffness": 1e5, "friction": 0.3, "friction_law": "lugre", "bristle_stiffness": 9, "bristle_damping": 8,
+         "viscous_friction": 0.1, "lateral": False},
+        {"law": {"stiffness": 1e5},
+         "friction": {"type": "lugre", "dynamic": 0.3, "stiffness": 9, "damping": 8, "viscous": 0.1, "lateral": False}},
+    ),
+    (
+        {"normal_law": "rigid", "friction": 0.3, "restitution": 0.1},
+        {"law": {"type": "rigid", "restitution": 0.1}, "friction": {"dynamic": 0.3}},
+    ),
+    (
+        {"soil": "dry_sand", "dissipation": 1.0, "lateral": False},
+        {"soil": {"type": "dry_sand", "dissipation": 1.0, "lateral": False}},
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("single", "parts"), ONE_BY_ONE)
+def test_keys_one_by_one_are_those_of_laws(single: dict[str, Any], parts: dict[str, Any]) -> None:
+    digests = set()
+    for keys in (single, {"law": single}, parts):
+        m = eg.Model("shoe", gravity=(0, -9.81, 0))
+        body = m.body("shoe", mass=1, inertia={"zz": 0.01})
+        m.planar("j", m.ground, body)
+        shape: dict[str, Any] = {"shape": "circle", "radius": 0.1}
+        if "soil" in keys or "soil" in keys.get("law", ()):
+            shape = {"shape": "plate", "length": 0.3, "width": 0.2}
+        m.contacts("floor", {**shape, "on": body}, {"shape": "half_plane", "on": m.ground}, **keys)
+        digests.add(m.compile(target="numpy", kernels=["poses"]).metadata["model_digest"])
+    assert len(digests) == 1
 
 
 @pytest.mark.parametrize(
