@@ -96,7 +96,7 @@ def read_unit(text: str) -> Unit:
 
 
 def sound_unit(text: Any) -> Unit | None:
-    """The unit of a text; None where there is none, or it is at fault, which is told where the unit is read."""
+    """The unit of a text; None where there is none, or it is at fault, which is reported where the unit is read."""
     try:
         return read_unit(text) if isinstance(text, str) and text else None
     except UnitError:
