@@ -15,25 +15,11 @@ from ..expr.core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_
 from ..expr.differentiate import jvp
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
+from . import kinds
 from .constraints.switching import SWITCHING
 from .dimensions import ENERGY, LENGTH, REACH, TIME
 from .element_type import ElementType, Types, key, keys_of, table
-from .kinds import (
-    MOTION,
-    Axis,
-    Choice,
-    CoordinateName,
-    CoordinateNames,
-    Fields,
-    Latexes,
-    Limits,
-    Number,
-    Pair,
-    Scalar,
-    TwoAxes,
-    Vector,
-    ref,
-)
+from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
 from .looks import JointLook, SymbolPart
 from .rotations import euler_parameters_from_matrix
 from .scalars import AXES, elementary
@@ -99,18 +85,18 @@ ROD_LENGTH = Scalar(
     remedy="give a length greater than 0",
     dimension=LENGTH,
 )
-BETWEEN = Pair(
+BETWEEN = kinds.Pair(
     "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P", required=True
 )
-AXIS = Axis("axis of the joint, in both markers", default="z")
-AXIS_PAIR = TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
-COORDINATE = CoordinateName("name of the coordinate (the joint's name unless given)")
-COORDINATES = CoordinateNames("names of the coordinates, in order")
-LATEX = Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
+AXIS = kinds.Axis("axis of the joint, in both markers", default="z")
+AXIS_PAIR = kinds.TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
+COORDINATE = kinds.CoordinateName("name of the coordinate (the joint's name unless given)")
+COORDINATES = kinds.CoordinateNames("names of the coordinates, in order")
+LATEX = kinds.Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
 #: Data of a joint that has coordinates; the last only where it has one.
 DATA: Fields = {
-    "limits": Limits("limits of the coordinate; a run that passes one warns, but nothing stops there"),
-    "dry_friction": Number(
+    "limits": kinds.Limits("limits of the coordinate; a run that passes one warns, but nothing stops there"),
+    "dry_friction": kinds.Number(
         "Coulomb friction (N m or N); stored, but it does not act",
         allowed=NOT_NEGATIVE,
         remedy="friction must be 0 or positive",

@@ -121,12 +121,9 @@ def _check_bindings(reader: Reader, check: _Check) -> dict[str, list[int]]:
 def _takes_in(reader: Reader, wrong: Mapping[str, list[int]], path: str, expression: Expr) -> bool:
     """Whether an expression is of an instance and has one of the nodes in it that the instance wrongly has."""
     origin = reader.faults.origin_of(path)[1]
-    inside = [
-        nodes
-        for outer, nodes in wrong.items()
-        if origin is not None and (f"{origin.instance}.").startswith(f"{outer}.")
-    ]
-    return not set().union(*inside).isdisjoint(reachable(reader.graph, [expression.id]))
+    name = "" if origin is None else f"{origin.instance}."
+    inside = {node for outer, nodes in wrong.items() if name.startswith(f"{outer}.") for node in nodes}
+    return not inside.isdisjoint(reachable(reader.graph, [expression.id]))
 
 
 def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Output, ...]) -> tuple[Output, ...]:
