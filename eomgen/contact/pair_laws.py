@@ -88,6 +88,8 @@ def _on_cell(kind: str) -> Make:
     return lambda g: SoilCell(*g.laws, kind, g.second, g.first[0], None if g.height is None else g.height())
 
 
+#: Features that points may pass, however thick the bodies of these are, and the points.
+_THIN, _POINTS = ("segment", "edge", "arc", "rod", CORE), ("vertex", "pad", "rounded_corner")
 _OUTLINED = ("round", "corner", "vertex", "pad")
 #: Features that meet -> their contact.  The first is a surface, or both are of one class.
 MEETINGS: dict[tuple[str, str], Make] = {
@@ -420,7 +422,7 @@ def pair_kind(
         tuple(seen),
         tuple(met),
         states=len(held),
-        thin=(names[0] in ("segment", "edge", "arc")) * (2 if names[1] in ("vertex", "pad") else 1),
+        thin=2 if names[0] in _THIN and names[1] in _POINTS else int(names[0] in ("edge", "arc")),
         calls=tuple(
             (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})
         ),

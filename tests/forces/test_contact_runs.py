@@ -11,8 +11,10 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, on
+from flying_bodies import flying
 from models import IN_C
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 from sweeps import part_of
 
 import eomgen as eg
@@ -45,6 +47,27 @@ def test_no_method_steps_over_a_wall(target: str, method: str, way: float) -> No
     run = wall(target).simulate((0, 0.3 * way), initial={"j_x_dot": SPEED * way}, method=method)
     assert run["j_x_dot"][-1] == pytest.approx(-SPEED * way, rel=1e-5)
     assert run["j_x"].max() < 2.0
+
+
+@pytest.mark.parametrize("thin", ["segment", "cuboid"])
+def test_corners_of_a_thick_box_step_over_nothing_thin(thin: str) -> None:
+    """Of 0.4 m at 3 m/s, a corner ahead, against 1 mm that is stiff enough: it comes back."""
+    law = {"stiffness": 1e12, "exponent": 2}
+    if thin == "segment":
+        m, (body,) = scenes.planar("thin", 1, (0, 0, 0))
+        wall: dict[str, Any] = {"shape": thin, "length": 3.0, "radius": 5e-4}
+        box: dict[str, Any] = {"shape": "box", "size": (0.4, 0.4)}
+        m.contacts("c", on(box, body), on(wall, m.ground.at(2, 0, 0, rpy=(0, 0, np.pi / 2))), law)
+        turn = {"j0_3": 0.8}
+    else:
+        m, (body,) = flying(1)
+        wall, box = ({"shape": thin, "size": size, "edge_radius": 4e-4} for size in ((1e-3, 3.0, 3.0), (0.4, 0.4, 0.4)))
+        m.contacts("c", on(box, body), on(wall, m.ground.at(2, 0, 0)), law)
+        x, y, z, w = Rotation.align_vectors([(1.0, 0.02, 0.01)], [(1, 1, 1)])[0].as_quat()
+        turn = {"j0_e0": w, "j0_e1": x, "j0_e2": y, "j0_e3": z}
+    mod = m.compile(target="numpy")
+    for method in ("DOP853", "RK45"):
+        assert mod.simulate(0.5, {"j0_x": 1.2, "j0_x_dot": 3.0, **turn}, method=method)["j0_x"][-1] < 2.0
 
 
 @pytest.mark.thorough
