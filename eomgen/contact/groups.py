@@ -439,7 +439,7 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, E
         e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has, or soil", "EG-MISSING")
         return None
     law, rubbing = e.part("law"), e.values.get("friction", {})
-    if law is None or law.element_type.read is None:
+    if law is None:
         return None
     normal, rigid = law.element_type.read(law), law.element_type is RIGID
     restitution = None

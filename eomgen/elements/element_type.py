@@ -147,7 +147,7 @@ class Entry:
     def read_part(self, key: str) -> Any:
         """The law under a key; None where there is none, or a fault, which is noted."""
         law = self.part(key)
-        return None if law is None or law.element_type.read is None else law.element_type.read(law)
+        return None if law is None else law.element_type.read(law)
 
     def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
         """Two markers."""
@@ -225,7 +225,7 @@ class ElementType(NamedTuple):
     doc: str  #: what it is, in one sentence that goes on from "Add"
     keys: Fields  #: besides ``type``, in the order of the method's arguments
     #: Entry -> the element; None where the entry has a fault, which is noted.
-    read: Callable[[Entry], Any] | None = None
+    read: Callable[[Entry], Any] = lambda e: None
     one_of: tuple[str, ...] = ()  #: keys of which exactly one is given
     remedies: Mapping[str, str] = {}  #: what to do instead, for keys that people give something of another kind
     ends: tuple[str, str] = ("a", "b")  #: arguments of the method for a key of two markers or joints

@@ -262,5 +262,5 @@ def build_elements(reader: Reader, what: str, entries: list[DescribedEntry], typ
 
 def _build(e: Entry, what: str, types: Types) -> Any:
     result = _type_of(e, what, types)
-    element = None if result is None or result.read is None else result.read(e)
+    element = None if result is None else result.read(e)
     return None if e.at_fault() else element

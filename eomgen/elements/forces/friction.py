@@ -605,7 +605,7 @@ def _joint_friction(e: Entry) -> Force | None:
     values = {key: e.values[name] for key, name in names.items() if name in e.values}
     if values.keys() - {"viscous"}:
         law = e.as_law(FRICTION, e["friction_law"], values, e.path, names)
-        dry = None if law.element_type.read is None else law.element_type.read(law)
+        dry = law.element_type.read(law)
         return None if path is None or dry is None else JointFriction(e.name, path, dry)
     if viscous is None and not e.at_fault():
         remedy = "give viscous, coulomb with smoothing, coefficient with smoothing, or several"
