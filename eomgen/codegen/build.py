@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ def program_of(
     massless = require_inertia(kinematics, mobility, tree)
     indefinite = kinematics.mechanism.negative
     if (massless or indefinite) and tree.accelerations is not None:
-        tree = tree.without_accelerations()  # which divide by pivots before they are looked at
+        tree = replace(tree, accelerations=None, pivots=())  # which divide by pivots before they are looked at
     metadata = collect_metadata(kinematics, mobility, tree) | made
     metadata |= {"no_inertia": massless or "", "indefinite": bool(indefinite)}
     limits = Limits(unrolled_loops=0) if arrays else Limits()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 from ..expr.evaluate import Evaluator
@@ -86,8 +86,7 @@ def _choose_with_constraints(kinematics: Kinematics, mobility: Mobility) -> tupl
 
 def _with_shorter(recursive: TreeEquations, embedding: TreeEquations) -> TreeEquations:
     """The recursive form with the mass matrix, forces and inverse dynamics of the other where these are shorter."""
-    result = copy(recursive)
-    result.take_mass_matrix(embedding)
+    result = replace(recursive, mass=embedding.mass)
     if count(list(embedding.bias)).total < count(list(recursive.bias)).total:
         result.bias = embedding.bias
     if count(list(embedding.inverse_dynamics)).total < count(list(recursive.inverse_dynamics)).total:

@@ -11,7 +11,6 @@ from ..base.names import acceleration_name
 from ..base.operations import operations_with
 from ..contact.pairs import pair_call
 from ..elements.forces.force import where
-from ..elements.frames import Frame, Marker
 from ..errors import UsageError
 from ..expr.core import Expr, reachable, substitute
 from ..expr.notation import rate_of
@@ -161,13 +160,7 @@ class SystemTerms:
     @cached_property
     def coordinate_of(self) -> tuple[int, ...]:
         """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints and states."""
-        if self.general_rates:
-            return self.kinematics.coordinate_of
-        turning = {k for _, j in self.quaternion_slots for k in range(j, j + 3)}
-        turning |= set(range(self.n_v - self.n_states, self.n_v))
-        parameters = {k for i, _ in self.quaternion_slots for k in range(i, i + 4)}
-        plain = iter([k for k in range(len(self.q)) if k not in parameters])
-        return tuple(-1 if k in turning else next(plain) for k in range(self.n_v))
+        return (*self.kinematics.coordinate_of, *[-1] * self.n_states)
 
     @property
     def q_dot(self) -> Row:
@@ -394,9 +387,8 @@ def _poses(kinematics: Kinematics) -> Row:
     """Body frames in ground axes as 4 x 4 matrices, row by row, in the order the bodies were declared."""
     graph = kinematics.graph
     entries: list[Expr] = []
-    for k, body in enumerate(kinematics.mechanism.bodies):
-        origin = Marker(k, Frame.identity(graph), body.name)
-        pose = kinematics.poses.marker(origin)
+    for k in range(len(kinematics.mechanism.bodies)):
+        pose = kinematics.poses.marker(kinematics.motion.body(k))
         for row, x in zip(pose.rotation, pose.position, strict=True):
             entries += [*row, x]
         entries += [graph.zero, graph.zero, graph.zero, graph.one]

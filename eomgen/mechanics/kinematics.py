@@ -6,10 +6,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, fields, is_dataclass
 from functools import cached_property
 
-from ..base.names import acceleration_name
 from ..elements.forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..elements.frames import Marker
-from ..elements.joints import QuaternionSlot
 from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute, symbols_of
@@ -17,7 +15,6 @@ from ..expr.differentiate import jvp
 from ..expr.records import dataclass
 from ..expr.spatial import Twist
 from ..expr.vectors import Vec3
-from ..model.equations import clock
 from ..model.mechanism import Mechanism
 from .link_frames import AxisTurns
 from .loops import (
@@ -31,7 +28,7 @@ from .loops import (
     refuse_unusable,
 )
 from .motion import MarkerMotion, entries_of, with_entries
-from .topology import MotionSymbols, Topology, find_topology, lay_out, length_scale
+from .topology import MotionSymbols, Topology, find_topology, length_scale, motion_symbols
 from .tree import JointRates, Link, Poses, build_links, link_twists
 
 
@@ -66,27 +63,11 @@ class ForceTerms:
 
 
 @dataclass(frozen=True)
-class Kinematics:
-    """The tree, its motion, loop constraints and resolved forces, in (t, q, v, a), inputs and parameters.
-
-    ``q`` are the coordinates of the spanning tree in the order of ``names``; ``v`` and ``a`` its generalized velocities
-    and their rates, in the order of ``velocity_names``.  ``rates`` is q' = N(q) v, which is v itself but for Euler
-    parameters.  ``parent[j]`` is the velocity next to velocity j towards ground, -1 for none.
-    """
+class Kinematics(MotionSymbols):
+    """The tree, its motion, loop constraints and resolved forces, in (t, q, v, a), inputs and parameters."""
 
     mechanism: Mechanism
     topology: Topology
-    names: tuple[str, ...]
-    kinds: tuple[str, ...]  #: 'angle', 'length' or 'parameter' per coordinate
-    velocity_names: tuple[str, ...]
-    velocity_kinds: tuple[str, ...]
-    quaternion_slots: tuple[QuaternionSlot, ...]  #: where Euler parameters stand in q, and their angular velocity in v
-    q: tuple[Expr, ...]
-    v: tuple[Expr, ...]
-    a: tuple[Expr, ...]
-    t: Expr
-    rates: tuple[Expr, ...]
-    parent: tuple[int, ...]
     links: tuple[Link, ...]
     poses: Poses
     twists: tuple[Twist, ...]
@@ -143,40 +124,6 @@ class Kinematics:
         """Names of the coordinates that are Euler parameters, four by four."""
         return tuple(self.names[i : i + 4] for i, _ in self.quaternion_slots)
 
-    @property
-    def flow(self) -> dict[Expr, Expr]:
-        """The rates of the coordinates, q' = N(q) v, as the direction of a derivative."""
-        return dict(zip(self.q, self.rates, strict=True))
-
-    @cached_property
-    def clock(self) -> dict[Expr, Expr]:
-        """The rates of all that is prescribed, t' = 1 and those of the inputs, as the direction of a derivative."""
-        return clock(self.graph, self.mechanism.inputs)
-
-    @cached_property
-    def velocity_labels(self) -> tuple[str, ...]:
-        """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
-        if self.mechanism.given is not None:
-            places = self.coordinate_of
-            return tuple(n if k < 0 else self.names[k] for n, k in zip(self.velocity_names, places, strict=True))
-        bases = set(self.names)
-        return tuple(n[:-4] if n.endswith("_dot") and n[:-4] in bases else n for n in self.velocity_names)
-
-    @property
-    def general_rates(self) -> bool:
-        """Whether q' = N(q, t) v + b(q, t) of given equations, beyond q' = v."""
-        return self.mechanism.given is not None and self.rates != self.v
-
-    @cached_property
-    def coordinate_of(self) -> tuple[int, ...]:
-        """Per velocity of given equations the coordinate whose rate it is, -1 for none."""
-        return tuple(self.rates.index(v) if v in self.rates else -1 for v in self.v)
-
-    def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
-        """d/dt along q' = N v, v' = a, t' = 1, and the rates of the inputs."""
-        along = self.flow | dict(zip(self.v, self.a, strict=True))
-        return jvp(list(expressions), along | self.clock)
-
     def resolve(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Replace coordinates of cut joints and marker quantities by what they are in terms of the tree."""
         mapping = self.motion.derived_symbols(self.mechanism, symbols_of(list(expressions)))
@@ -187,17 +134,12 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     """Form the kinematics of a mechanism; ``independent`` names coordinates whose joints stay in the tree."""
     graph = mechanism.graph
     topology = find_topology(mechanism, set(independent) or set(mechanism.independent))
-    layout = lay_out(mechanism, topology)
-    names, kinds = layout.names, layout.kinds
-    q, v = (tuple(map(graph.symbol, listed)) for listed in (names, layout.velocity_names))
-    a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
-    t = graph.symbol("t")
-    rates = layout.rates(graph, q, v)
-    state = MotionSymbols(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
+    state = motion_symbols(mechanism, topology)
+    names, q, rates = state.names, state.q, state.rates
     symbols = dict(zip(names, q, strict=True))
     links = build_links(mechanism, topology, symbols, AxisTurns(mechanism, topology, symbols).turned)
     poses = Poses(mechanism, links)
-    twists = tuple(link_twists(graph, links, v))
+    twists = tuple(link_twists(graph, links, state.v))
     rows = equation_rows(mechanism)
     aligned: list[tuple[str, Expr]] = []
     loop_names: list[str] = []
@@ -214,7 +156,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
-    second = jvp(list(rates), state.along) if layout.quaternion_slots or layout.given else a
+    second = state.a if rates == state.v else state.total_derivative(rates)
     coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = MarkerMotion(poses, twists, state, coordinates, _turning(mechanism, topology))
@@ -225,19 +167,9 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     refuse_rows_of_time(mechanism, constraints)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
+        **{part.name: getattr(state, part.name) for part in fields(state)},
         mechanism=mechanism,
         topology=topology,
-        names=names,
-        kinds=kinds,
-        velocity_names=layout.velocity_names,
-        velocity_kinds=layout.velocity_kinds,
-        quaternion_slots=layout.quaternion_slots,
-        q=q,
-        v=v,
-        a=a,
-        t=t,
-        rates=rates,
-        parent=layout.parent,
         links=links,
         poses=poses,
         twists=twists,

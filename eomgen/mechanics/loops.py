@@ -146,13 +146,13 @@ def differentiate_constraints(
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
     along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
     velocity = jvp(values, along)
-    if not state.in_order:  # q' may keep a constraint by itself, as that of Euler parameters keeps their norm
+    if state.general_rates:  # q' may keep a constraint by itself, as that of Euler parameters keeps their norm
         kept_by_rates = zip(velocity, kept, vanishes(velocity), strict=False)
         velocity = [graph.zero if row.written and zero else x for x, row, zero in kept_by_rates]
     entries = state.slopes(values, velocity)
     m = len(values)
     entries |= {(m + i, j): e for (i, j), e in jacobian(nonholonomic, list(state.v)).items()}
-    slopes = {} if state.in_order else jacobian(values, list(state.q))
+    slopes = jacobian(values, list(state.q)) if state.general_rates else {}
     at_rest = dict.fromkeys(state.v, graph.zero)
     zero = graph.zero
     still = [(x, rate) for x, rate in zip(state.q, substitute(state.rates, at_rest), strict=True) if not rate.is_zero]

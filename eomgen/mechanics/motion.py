@@ -349,9 +349,13 @@ class MarkerMotion:
         value, rate, _ = self.coordinates[name]
         return value, rate
 
+    def body(self, k: int) -> Marker:
+        """The origin and axes of a body of the mechanism, or of ground."""
+        return Marker(k, Frame.identity(self.graph), "ground" if k == GROUND else self.poses.names[k])
+
     @cached_property
     def _ground(self) -> Marker:
-        return Marker(GROUND, Frame.identity(self.graph), "ground")
+        return self.body(GROUND)
 
     @cached_property
     def momentum(self) -> Momentum:

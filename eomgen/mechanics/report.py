@@ -20,7 +20,7 @@ from ..base.results import picture_html, side_by_side
 from ..base.scales import largest
 from ..base.texts import angle_in_degrees, fold, html_table, terminal_width
 from ..elements.constraints import Driver
-from ..elements.frames import Frame, Marker
+from ..elements.frames import Marker
 from ..errors import bad_file
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable, symbols_of
@@ -192,12 +192,11 @@ def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
 
 def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
     """Bodies with one moment of inertia, as in a plane, whose joints turn them about other axes too."""
-    mechanism, graph = kinematics.mechanism, kinematics.graph
-    bodies = [(k, body) for k, body in enumerate(mechanism.bodies) if body.plane is not None]
+    motion = kinematics.motion
+    bodies = [(k, body) for k, body in enumerate(kinematics.mechanism.bodies) if body.plane is not None]
     across: list[Expr] = []
     for k, body in bodies:
-        marker = Marker(k, Frame.identity(graph), body.name)
-        spin = kinematics.motion.turning_of(marker, own_axes=True, rate=False)
+        spin = motion.turning_of(motion.body(k), own_axes=True, rate=False)
         across += vec.cross(spin, body.plane or spin)
     zero = vanishes(across, ACROSS, pieces=True, unknown=True)
     return [body.name for k, (_, body) in enumerate(bodies) if not all(zero[3 * k : 3 * k + 3])]
@@ -480,12 +479,8 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
         assembly_restarts=mobility.restarts,
         assumed=mobility.assumed,
         elements=[
-            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)]}
-            for e in m.constraints
-        ]
-        + [
-            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)], **TIMED}
-            for e in (s.constraint for s in m.switched)
+            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)], **timed}
+            for e, timed in [*((e, {}) for e in m.constraints), *((s.constraint, TIMED) for s in m.switched)]
             if e is not None
         ],
         guessed={name: [guess, value] for name, guess, value in mobility.guessed},
@@ -515,14 +510,11 @@ def _touched(kinematics: Kinematics, element: object) -> list[int]:
 
 def plane_axis(kinematics: Kinematics) -> int | None:
     """The ground axis about which every body turns and across which it moves, identically; else None."""
-    graph = kinematics.graph
-    turns, slides = [], []
-    for k in range(len(kinematics.mechanism.bodies)):
-        origin = Marker(k, Frame.identity(graph), "")
-        turns.append(kinematics.motion.angular_velocity(origin))
-        slides.append(kinematics.motion.velocity(origin))
-    for axis in range(3 if turns else 0):
-        others = [i for i in range(3) if i != axis]
-        if all(w[i].is_zero for w in turns for i in others) and all(v[axis].is_zero for v in slides):
+    motion = kinematics.motion
+    origins = [motion.body(k) for k in range(len(kinematics.mechanism.bodies))]
+    turns, slides = map(motion.angular_velocity, origins), map(motion.velocity, origins)
+    moves = [*zip(turns, slides, strict=True)]
+    for axis in range(3 if moves else 0):
+        if all(v[axis].is_zero and all(w[i].is_zero for i in range(3) if i != axis) for w, v in moves):
             return axis
     return None

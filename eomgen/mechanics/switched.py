@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from ..elements.forces import CoordinateLoad, MarkerLoad
 from ..elements.forces.force import Force, Load, View, where
-from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
 from ..expr.differentiate import jacobian
@@ -112,15 +111,10 @@ def _while_closed(switch: Switched, x: Expr) -> Expr:
     return where(switch.holds, x, 0.0)
 
 
-def _origin(kinematics: Kinematics, body: int) -> Marker:
-    graph = kinematics.graph
-    return Marker(body, Frame.identity(graph), kinematics.mechanism.bodies[body].name)
-
-
 def _load(kinematics: Kinematics, body: int, D: Row6, multiplier: Expr) -> MarkerLoad:
     """The wrench -l D on a body, about its origin."""
     x = [-(d * multiplier) for d in D]
-    return MarkerLoad(_origin(kinematics, body), (x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    return MarkerLoad(kinematics.motion.body(body), (x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
 
 def _left(kinematics: Kinematics, J: Sequence[Expr], on_bodies: dict[int, Row6]) -> list[Expr]:
@@ -129,7 +123,7 @@ def _left(kinematics: Kinematics, J: Sequence[Expr], on_bodies: dict[int, Row6])
         return list(J)
     graph, total = kinematics.graph, list(J)
     for body, D in on_bodies.items():
-        marker = _origin(kinematics, body)
+        marker = kinematics.motion.body(body)
         v, w = kinematics.motion.velocity(marker), kinematics.motion.angular_velocity(marker)
         slopes = jacobian([*v, *w], list(kinematics.v))
         for j in range(len(total)):

@@ -9,25 +9,27 @@ are always cut, joints that cannot be cut (a point on a curve) never.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from ..base.limits.numbers import HAIR, NO_LENGTH
+from ..base.names import acceleration_name
 from ..elements.constraints import CoordinateDriver
 from ..elements.frames import GROUND
 from ..elements.joints import Distance, QuaternionSlot, RevoluteSpherical, parameter_rates
 from ..errors import ModelError
 from ..expr import vectors as vec
-from ..expr.core import Expr, Graph
-from ..expr.differentiate import jacobian
+from ..expr.core import Expr
+from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import Evaluator
 from ..expr.identity import rounded_vector, size_of
 from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from ..model.checks import UNHELD
+from ..model.equations import clock
 from ..model.mechanism import JointSpec, Mechanism
 
 #: Joints of a loop above which equations count more than lengths of chains: forces and multipliers of long loops are
@@ -210,58 +212,54 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
 
 
 @dataclass(frozen=True)
-class StateLayout:
-    """Names and kinds of the tree's coordinates and velocities.
+class MotionSymbols:
+    """Coordinates, velocities, accelerations of the tree and time: names, kinds, symbols, and q' in terms of them.
 
-    ``parent`` is per velocity the branch-induced parent (Featherstone, RBDA, sec. 6.4); ``quaternion_slots`` says where
-    Euler parameters are, the other velocities being the rates of the other coordinates in the same order.  ``given`` is
-    q' of given equations where it is not v itself.
+    ``q`` are the coordinates in the order of ``names``; ``v`` and ``a`` the generalized velocities and their rates, in
+    the order of ``velocity_names``.  ``rates`` is q' = N(q) v, which is v itself but for Euler parameters and given
+    equations.  ``parent[j]`` is the velocity next to velocity j towards ground, -1 for none (Featherstone, RBDA,
+    sec. 6.4).
     """
 
     names: tuple[str, ...]
-    kinds: tuple[str, ...]
+    kinds: tuple[str, ...]  #: 'angle', 'length' or 'parameter' per coordinate
     velocity_names: tuple[str, ...]
     velocity_kinds: tuple[str, ...]
     parent: tuple[int, ...]
-    quaternion_slots: tuple[QuaternionSlot, ...] = ()
-    given: tuple[Expr, ...] = ()
-
-    def rates(self, graph: Graph, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[Expr, ...]:
-        """q' = N(q) v."""
-        if self.given:
-            return self.given
-        if not self.quaternion_slots:
-            return tuple(v)
-        turning = {k for slot in self.quaternion_slots for k in range(slot.velocity, slot.velocity + 3)}
-        plain = iter([x for k, x in enumerate(v) if k not in turning])
-        starts = {slot.coordinate: slot.velocity for slot in self.quaternion_slots}
-        result: list[Expr] = []
-        while len(result) < len(q):
-            i = len(result)
-            if i in starts:
-                result += parameter_rates(q[i : i + 4], v[starts[i] : starts[i] + 3])
-            else:
-                result.append(next(plain))
-        return tuple(result)
-
-
-@dataclass(frozen=True)
-class MotionSymbols:
-    """The symbols of the motion: coordinates, velocities, accelerations, time; and q' in terms of them."""
-
+    quaternion_slots: tuple[QuaternionSlot, ...]  #: where Euler parameters stand in q, and their angular velocity in v
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
     a: tuple[Expr, ...]
     t: Expr
     rates: tuple[Expr, ...]
-    clock: Mapping[Expr, Expr]  #: t' = 1, and the rates of the inputs
-    in_order: bool = True  #: whether velocities are rates of coordinates, or angular velocities: not so if given
+    clock: dict[Expr, Expr]  #: t' = 1, and the rates of the inputs, as the direction of a derivative
+    general_rates: bool  #: whether q' = N(q, t) v + b(q, t) of given equations, beyond q' = v
+
+    @property
+    def flow(self) -> dict[Expr, Expr]:
+        """The rates of the coordinates, q' = N(q) v, as the direction of a derivative."""
+        return dict(zip(self.q, self.rates, strict=True))
 
     @cached_property
     def along(self) -> dict[Expr, Expr]:
         """The direction of d/dt: q' = N v, v' = a, t' = 1, and the rates of the inputs."""
-        flow = dict(zip(self.q, self.rates, strict=True)) | dict(zip(self.v, self.a, strict=True))
-        return {**flow, **self.clock}
+        return {**self.flow, **dict(zip(self.v, self.a, strict=True)), **self.clock}
+
+    def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
+        """d/dt along q' = N v, v' = a, t' = 1, and the rates of the inputs."""
+        return jvp(list(expressions), self.along)
+
+    @cached_property
+    def coordinate_of(self) -> tuple[int, ...]:
+        """Per velocity the coordinate whose rate it is, -1 for none, as for an angular velocity."""
+        places = {rate: k for k, rate in reversed([*enumerate(self.rates)])}
+        return tuple(places.get(v, -1) for v in self.v)
+
+    @cached_property
+    def velocity_labels(self) -> tuple[str, ...]:
+        """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
+        places = self.coordinate_of
+        return tuple(n if k < 0 else self.names[k] for n, k in zip(self.velocity_names, places, strict=True))
 
     def slopes(self, values: Sequence[Expr], rates: Sequence[Expr]) -> dict[tuple[int, int], Expr]:
         """Derivatives by v of the rates of functions of q: df/dq N."""
@@ -270,29 +268,25 @@ class MotionSymbols:
         return jacobian(list(rates), list(self.v))
 
 
-def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
+def motion_symbols(mechanism: Mechanism, topology: Topology) -> MotionSymbols:
     """The coordinates and velocities of the tree, in its order."""
-    if mechanism.given is not None:
-        equations, n = mechanism.given, len(mechanism.given.velocities)
-        rates = () if equations.rates == tuple(map(mechanism.graph.symbol, equations.velocities)) else equations.rates
-        angles, turns = ("angle",) * len(equations.coordinates), ("angle",) * n
-        return StateLayout(
-            equations.coordinates, angles, equations.velocities, turns, tuple(range(-1, n - 1)), given=rates
-        )
-    names_list: list[str] = []
-    kinds_list: list[str] = []
+    graph, equations = mechanism.graph, mechanism.given
+    names: list[str] = []
+    kinds: list[str] = []
     velocity_names: list[str] = []
     velocity_kinds: list[str] = []
     parent: list[int] = []
-    quaternion_slots: list[QuaternionSlot] = []
+    slots: list[QuaternionSlot] = []
+    if equations is not None:
+        names, velocity_names = [*equations.coordinates], [*equations.velocities]
+        kinds, velocity_kinds = ["angle"] * len(names), ["angle"] * len(velocity_names)
+        parent = [*range(-1, len(velocity_names) - 1)]
     last = {GROUND: -1}  # the velocity next to a body towards ground
     for branch in topology.branches:
         spec = mechanism.joints[branch.joint]
-        quaternion_slots += [
-            QuaternionSlot(len(names_list) + i, len(velocity_names) + j) for i, j in spec.joint.quaternion_slots
-        ]
-        names_list += spec.coordinates
-        kinds_list += [coordinate.kind for coordinate in spec.joint.coordinates]
+        slots += [QuaternionSlot(len(names) + i, len(velocity_names) + j) for i, j in spec.joint.quaternion_slots]
+        names += spec.coordinates
+        kinds += [coordinate.kind for coordinate in spec.joint.coordinates]
         above = last[branch.parent]
         for name, velocity in zip(spec.velocities, spec.joint.velocities, strict=True):
             parent.append(above)
@@ -300,14 +294,32 @@ def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
             velocity_names.append(name)
             velocity_kinds.append(velocity.kind)
         last[branch.body] = above
-    return StateLayout(
-        tuple(names_list),
-        tuple(kinds_list),
-        tuple(velocity_names),
-        tuple(velocity_kinds),
-        tuple(parent),
-        tuple(quaternion_slots),
+    q, v = (tuple(map(graph.symbol, listed)) for listed in (names, velocity_names))
+    rates = _rates(q, v, slots) if equations is None else equations.rates
+    return MotionSymbols(
+        names=tuple(names),
+        kinds=tuple(kinds),
+        velocity_names=tuple(velocity_names),
+        velocity_kinds=tuple(velocity_kinds),
+        parent=tuple(parent),
+        quaternion_slots=tuple(slots),
+        q=q,
+        v=v,
+        a=tuple(graph.symbol(acceleration_name(n)) for n in velocity_names),
+        t=graph.symbol("t"),
+        rates=rates,
+        clock=clock(graph, mechanism.inputs),
+        general_rates=equations is not None and rates != v,
     )
+
+
+def _rates(q: Sequence[Expr], v: Sequence[Expr], slots: Sequence[QuaternionSlot]) -> tuple[Expr, ...]:
+    """q' = N(q) v: the velocities beside those of Euler parameters are the rates of the other coordinates in order."""
+    result = list(v)
+    for slot in slots:  # in ascending order, so that places in q are those in the result
+        i, j = slot.coordinate, slot.velocity
+        result[i : i + 3] = parameter_rates(q[i : i + 4], v[j : j + 3])
+    return tuple(result)
 
 
 # -- the length scale --------------------------------------------------------------------------------------------------

@@ -288,11 +288,19 @@ def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> l
     return twists
 
 
+def ancestors(links: Sequence[Link], k: int) -> list[int]:
+    """Link k, its parent, ..., GROUND."""
+    chain = [k]
+    while chain[-1] != GROUND:
+        chain.append(links[chain[-1]].parent)
+    return chain
+
+
 class Poses:
     """Placement of links and markers in ground axes or in an ancestor link, each made once when asked for."""
 
     def __init__(self, mechanism: Mechanism, links: tuple[Link, ...]) -> None:
-        self.graph = mechanism.graph
+        self.graph, self.names = mechanism.graph, [body.name for body in mechanism.bodies]
         self.links = links
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
         self._pass = self.graph.begin_pass()
@@ -307,10 +315,7 @@ class Poses:
 
     def ancestors(self, link: int) -> list[int]:
         """The link, its parent, ..., GROUND."""
-        chain = [link]
-        while chain[-1] != GROUND:
-            chain.append(self.links[chain[-1]].parent)
-        return chain
+        return ancestors(self.links, link)
 
     def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
         """Placement of a link in link ``base``, one of its ancestors, or in a constant frame ``within`` that link."""

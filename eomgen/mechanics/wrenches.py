@@ -8,9 +8,9 @@ moment about the body's origin).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..elements.forces import CoordinateLoad, MarkerLoad
 from ..elements.forces.force import Force
@@ -86,23 +86,47 @@ def virtual_power(kinematics: Kinematics, loads: Iterable[MarkerLoad | Coordinat
     return [a + b for a, b in zip(total, powers, strict=True)]
 
 
-def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
-    """Inertias of drives on coordinates of the tree, by the index of the velocity."""
-    result: dict[int, Expr] = {}
-    for spec in kinematics.mechanism.joints:
-        if spec.armature is not None and spec.coordinates[0] in kinematics.velocity_labels:
-            result[kinematics.velocity_labels.index(spec.coordinates[0])] = spec.armature
-    return result
-
-
-def cut_drives(kinematics: Kinematics) -> list[tuple[str, Expr]]:
-    """Inertias of drives on coordinates of cut joints, where they couple the coordinates of the tree through y_q.
+class Drive(NamedTuple):
+    """The rotor of a drive geared to a coordinate y of the tree or of a cut joint: its inertia and how y moves.
 
     A loop can close without any row (two hinges on one axis), and its cut joint still turn a drive.
     """
-    loop = kinematics.loop_coordinates.names
-    drives = [(s.coordinates[0], s.armature) for s in kinematics.mechanism.joints if s.armature is not None]
-    return [(name, inertia) for name, inertia in drives if name in loop]
+
+    coordinate: str
+    velocity: int  #: index of y' in v, -1 for a coordinate of a cut joint
+    inertia: Expr
+    rate: Expr
+    acceleration: Expr
+    slope: Sequence[Expr]  #: y_q (n_v,)
+
+    @property
+    def kinetic_energy(self) -> Expr:
+        """J y'^2 / 2."""
+        return 0.5 * self.inertia * (self.rate * self.rate)
+
+
+def find_drives(kinematics: Kinematics) -> list[Drive]:
+    """The drives with an inertia, in the order of the joints."""
+    k, loop, unit = kinematics, kinematics.loop_coordinates, [kinematics.graph.zero] * len(kinematics.v)
+    result = []
+    for name, inertia in ((s.coordinates[0], s.armature) for s in k.mechanism.joints if s.armature is not None):
+        if name in k.velocity_labels:
+            j = k.velocity_labels.index(name)
+            result.append(Drive(name, j, inertia, k.v[j], k.a[j], [*unit[:j], k.graph.one, *unit[j + 1 :]]))
+        else:
+            j = loop.names.index(name)
+            result.append(Drive(name, -1, inertia, loop.rates[j], loop.accelerations[j], loop.jacobian[j]))
+    return result
+
+
+def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
+    """Inertias of drives on coordinates of the tree, by the index of the velocity."""
+    return {drive.velocity: drive.inertia for drive in find_drives(kinematics) if drive.velocity >= 0}
+
+
+def cut_drives(kinematics: Kinematics) -> list[Drive]:
+    """Drives on coordinates of cut joints, where they couple the coordinates of the tree through y_q."""
+    return [drive for drive in find_drives(kinematics) if drive.velocity < 0]
 
 
 Row6 = tuple[Expr, ...]  # force, moment
@@ -209,11 +233,8 @@ class JointWrenches:
     @cached_property
     def origins(self) -> list[Vec3]:
         """Origins of the bodies, ground axes."""
-        frame = Frame.identity(self.kinematics.graph)
-        return [
-            self.kinematics.poses.marker(Marker(k, frame, body.name)).position
-            for k, body in enumerate(self.mechanism.bodies)
-        ]
+        motion = self.kinematics.motion
+        return [motion.position(motion.body(k)) for k in range(len(self.mechanism.bodies))]
 
     def _at_body(self, body: int, point: Vec3, wrench: Row6) -> Row6:
         """A wrench about a point, about the origin of a body instead."""
@@ -375,7 +396,7 @@ class JointWrenches:
                     point = poses.marker(load.marker).position
                     _take(total, load.marker.body, self._at_body(load.marker.body, point, (*load.force, *load.torque)))
         through = [[kinematics.graph.zero] * 6 for _ in self.cut]
-        for name, value in self._loads_on_cut():
+        for name, value in self.loads_on_cut():
             k, gradient = next((k, g) for k, joint in enumerate(self.cut) for n, g in joint.coordinates if n == name)
             for body, wrench in self._on_ends(self.cut[k].spec, gradient).items():
                 _take(total, body, tuple(value * x for x in wrench))
@@ -383,13 +404,11 @@ class JointWrenches:
         total += through
         return tuple(x for six in total for x in six)
 
-    def _loads_on_cut(self) -> list[tuple[str, Expr]]:
+    def loads_on_cut(self) -> list[tuple[str, Expr]]:
         """Force elements and inertias of drives along coordinates of cut joints."""
-        loop = self.kinematics.loop_coordinates
         loads = [(c.coordinate, c.value) for terms in self.kinematics.forces for c in terms.coordinate_loads]
-        for name, inertia in cut_drives(self.kinematics):
-            loads.append((name, -(inertia * loop.accelerations[loop.names.index(name)])))
-        return [(name, value) for name, value in loads if name in loop.names]
+        loads += [(d.coordinate, -(d.inertia * d.acceleration)) for d in cut_drives(self.kinematics)]
+        return [(name, value) for name, value in loads if name in self.kinematics.loop_coordinates.names]
 
 
 def _take(total: list[list[Expr]], body: int, wrench: Row6) -> None:
@@ -467,15 +486,20 @@ def kinetic_energy(kinematics: Kinematics) -> Expr:
     return 0.5 * total
 
 
+def gravity_on_links(kinematics: Kinematics) -> Iterator[tuple[Expr, Vec3]]:
+    """Of each link g . r of its origin, and g in its axes, carried outwards so that no ground pose is needed."""
+    result: list[tuple[Expr, Vec3]] = []
+    for link in kinematics.graph.marked(kinematics.links):
+        at_ground = kinematics.graph.zero, kinematics.mechanism.gravity
+        height, pull = at_ground if link.parent == GROUND else result[link.parent]
+        result.append((height + vec.dot(pull, link.position), link.down(pull)))
+        yield result[-1]
+
+
 def potential_energy(kinematics: Kinematics) -> Expr:
-    """V of gravity on the first moments, g in link axes carried outwards, and of the springs (J)."""
-    graph = kinematics.graph
-    total = graph.zero
-    heights: list[tuple[Expr, Vec3]] = []
-    for link in graph.marked(kinematics.links):
-        height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
-        height, pull = height + vec.dot(pull, link.position), link.down(pull)
-        heights.append((height, pull))
+    """V of gravity on the first moments and of the springs (J)."""
+    total = kinematics.graph.zero
+    for link, (height, pull) in zip(kinematics.links, gravity_on_links(kinematics), strict=True):
         total = total - (link.spatial.mass * height + vec.dot(pull, link.spatial.moment))
     for terms in kinematics.forces:
         if terms.potential is not None:
@@ -506,13 +530,11 @@ def inertial_terms(kinematics: Kinematics) -> list[Expr]:
         shift = vec.cross(link.frame.position, turned)
         twists.append((turned, vec.add(vec.times(link.frame.rotation, linear), shift)))
     rates = kinematics.total_derivative([x for angular, linear in twists for x in (*angular, *linear)])
-    falls: list[Vec3] = []  # gravity in link axes
     motions: dict[int, list[Expr]] = {}
-    for k, link in enumerate(links):
-        falls.append(link.down(kinematics.mechanism.gravity if link.parent == GROUND else falls[link.parent]))
+    for k, (link, (_, gravity)) in enumerate(zip(links, gravity_on_links(kinematics), strict=True)):
         angular, linear = twists[k]
         alpha, change = (vec.three(rates, 6 * k + at) for at in (0, 3))
-        fall = vec.times(link.frame.rotation, falls[k])
+        fall = vec.times(link.frame.rotation, gravity)
         lifted = vec.sub(vec.add(change, vec.cross(angular, linear)), fall)
         motions[link.body] = [*angular, *linear, *alpha, *lifted]
     still = [graph.zero] * MOTION
@@ -565,22 +587,15 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     forces = [force for force in kinematics.mechanism.forces if force.near(kinematics.motion)]
     if not forces:
         return {}
-    last: dict[int, int] = {GROUND: -1}
-    links = kinematics.links
-    for link in links:
-        above = -1 if link.parent == GROUND else last[links[link.parent].body]
-        last[link.body] = link.first + len(link.columns) - 1 if link.columns else above
-    parents = [-1] * len(kinematics.v)
-    for link in links:
-        above = -1 if link.parent == GROUND else last[links[link.parent].body]
-        for n in range(len(link.columns)):
-            parents[link.first + n] = above if n == 0 else link.first + n - 1
+    last = {GROUND: -1}
+    for branch, link in zip(kinematics.topology.branches, kinematics.links, strict=True):
+        last[branch.body] = link.first + len(link.columns) - 1 if link.columns else last[branch.parent]
     listed = [[force.name, len(force.near(kinematics.motion)), len(force.met_shapes())] for force in forces]
     return {
         "rigid_contacts": {
             "lists": listed,
             "moved_by": [last[body] for force in forces for body in force.met_bodies],
-            "parents": parents,
+            "parents": list(kinematics.parent),
             "bodies": [_name(kinematics, body) for force in forces for body in force.met_bodies],
         },
         **({"rigid_by_motion": moving} if (moving := _by_motion(kinematics, forces)) else {}),

@@ -20,7 +20,7 @@ from ..expr.texts import quoted
 from ..expr.vectors import Vec3
 from ..mechanics import Kinematics
 from ..mechanics.methods.free_bodies import FreeBodies
-from ..mechanics.wrenches import JointWrenches, cut_drives
+from ..mechanics.wrenches import JointWrenches
 from ..model.expressions import parse
 from ..model.sympy_face import free_names, is_sympy, lower_sympy, name_of, symbol
 from ..model.values import MULTIPLIERS, numbered
@@ -426,14 +426,12 @@ class BodiesApart:
 
     def _from_cut_joints(self, body: int) -> list[Wrench]:
         """What the joints that close loops do to a body: -lambda dC, and the loads along their coordinates."""
-        multipliers = self._multipliers()
-        loads = dict(FreeBodies(self.kinematics).along_cut)
-        loop = self.kinematics.loop_coordinates
-        for name, inertia in cut_drives(self.kinematics):  # takes a part of what drives the joint
-            rotor = inertia * loop.accelerations[loop.names.index(name)]
-            loads[name] = loads.get(name, self.graph.zero) - rotor
+        multipliers, joints = self._multipliers(), JointWrenches(self.kinematics)
+        loads: dict[str, Expr] = {}
+        for name, value in joints.loads_on_cut():
+            loads[name] = loads.get(name, self.graph.zero) + value
         result: list[Wrench] = []
-        for cut in JointWrenches(self.kinematics).cut:
+        for cut in joints.cut:
             ends = (cut.spec.predecessor.body, cut.spec.successor.body)
             if body not in ends:
                 continue

@@ -395,8 +395,7 @@ class Quantities:
     def markers(self) -> dict[str, Marker]:
         """Bodies by name, at their origins, and named markers as ``rod.tip``."""
         mechanism = self.kinematics.mechanism
-        own = Frame.identity(self.graph)
-        bodies = {body.name: Marker(k, own, body.name) for k, body in enumerate(mechanism.bodies)}
+        bodies = {body.name: self.kinematics.motion.body(k) for k, body in enumerate(mechanism.bodies)}
         return bodies | {marker.label: marker for marker in mechanism.presentation.named_markers}
 
     def pose(self, name: str) -> Rows:

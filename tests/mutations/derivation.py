@@ -158,8 +158,8 @@ FAULTS = (
     ),
     Fault(
         "armature-cut-joint", "add_armature",
-        "substitute([acceleration], still)[0]",
-        "graph.zero",
+        "substitute([drive.acceleration], still)[0]",
+        "kinematics.graph.zero",
         "a drive on a cut joint: J y_q^T y_qq q'^2 is left out of h",
         "tests/mechanics/test_joints.py::test_drive_on_a_slider_that_closes_a_loop[embedding]",
     ),

@@ -65,7 +65,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     turned = partial(_turned_system, kinematics, resolved, inertias, rest, blocks)
     return TreeEquations(
         method="embedding",
-        mass_matrix=mass,
+        mass=mass,
         bias=bias,
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),
@@ -233,7 +233,7 @@ def can_differentiate(kinematics: Kinematics) -> bool:
     mechanism = kinematics.mechanism
     if mechanism.bare or cut_drives(kinematics):
         return False
-    places = coordinate_places(kinematics)
+    places = kinematics.coordinate_of
     for link in kinematics.links:
         for c, (angular, linear) in enumerate(link.columns):
             index = link.first + c
@@ -241,14 +241,6 @@ def can_differentiate(kinematics: Kinematics) -> bool:
             if not symbols_of([*angular, *linear]) <= set(ahead):
                 return False
     return True
-
-
-def coordinate_places(kinematics: Kinematics) -> list[int]:
-    """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints."""
-    turning = {k for slot in kinematics.quaternion_slots for k in range(slot.velocity, slot.velocity + 3)}
-    parameters = {k for slot in kinematics.quaternion_slots for k in range(slot.coordinate, slot.coordinate + 4)}
-    plain = iter([k for k in range(len(kinematics.q)) if k not in parameters])
-    return [-1 if k in turning else next(plain) for k in range(len(kinematics.v))]
 
 
 def _last(kinematics: Kinematics, link: Link) -> int:
@@ -270,7 +262,7 @@ class ForceSlopes:
         two = kinematics.graph.constant(2.0)
         self._omegas = [twist[0] for twist in kinematics.twists]
         self._twice = [vec.scale(two, omega) for omega in self._omegas]
-        self._places = coordinate_places(kinematics)
+        self._places = kinematics.coordinate_of
         self._fields = [
             [self._field(k, *column, link.first + c) for c, column in enumerate(link.columns)]
             for k, link in enumerate(kinematics.links)

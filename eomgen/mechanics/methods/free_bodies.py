@@ -240,7 +240,7 @@ def free_body_equations(kinematics: Kinematics, method: str, system: LinearSyste
     inverse = _inverse_dynamics(bodies)
     return TreeEquations(
         method=method,
-        mass_matrix=hessian(inverse, kinematics.a),
+        mass=hessian(inverse, kinematics.a),
         bias=tuple(substitute(inverse, dict.fromkeys(kinematics.a, bodies.graph.zero))),
         inverse_dynamics=tuple(inverse),
         kinetic_energy=kinetic_energy(kinematics),

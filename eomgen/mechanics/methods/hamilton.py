@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from ...model.equations import momenta_and_rates
 from .. import Kinematics
-from ..wrenches import cut_drives, drive_inertias
+from ..wrenches import find_drives
 from .lagrange import form_energies, momentum_equations
 from .tree_equations import TreeEquations, direct_equations
 
@@ -26,9 +26,6 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         tree.canonical = (*momenta, *rates)
         return tree
     kinetic, potential = form_energies(kinematics)
-    loop = kinematics.loop_coordinates
-    drives = [(kinematics.v[j], inertia) for j, inertia in drive_inertias(kinematics).items()]
-    drives += [(loop.rates[loop.names.index(name)], inertia) for name, inertia in cut_drives(kinematics)]
-    for rate, inertia in drives:
-        kinetic = kinetic + 0.5 * inertia * (rate * rate)
+    for drive in find_drives(kinematics):
+        kinetic = kinetic + drive.kinetic_energy
     return momentum_equations(kinematics, "hamilton", kinetic, potential)

@@ -17,7 +17,7 @@ from ...expr.differentiate import gradient, hessian, jvp, vjp
 from ...expr.schedule import count
 from ...expr.vectors import Vec3
 from .. import Kinematics
-from ..wrenches import virtual_power
+from ..wrenches import gravity_on_links, virtual_power
 from .tree_equations import TreeEquations, direct_equations
 
 
@@ -37,13 +37,8 @@ def form_energies(kinematics: Kinematics, differentiated: bool = False) -> tuple
     """
     graph = kinematics.graph
     kinetic, potential = graph.zero, graph.zero
-    # g . r of each link's origin and g in link axes, outwards from ground, so that no ground pose is needed
-    heights: list[tuple[Expr, Vec3]] = []
-    for k, (link, (angular, linear)) in enumerate(zip(kinematics.links, kinematics.twists, strict=True)):
-        height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
-        height = height + vec.dot(pull, link.position)
-        pull = link.down(pull)
-        heights.append((height, pull))
+    links = zip(kinematics.links, kinematics.twists, gravity_on_links(kinematics), strict=True)
+    for k, (link, (angular, linear), (height, pull)) in enumerate(links):
         center = vec.add(linear, vec.cross(angular, link.com))
         if link.parent == GROUND:
             center = min(center, _velocity(kinematics, k), key=lambda v: count([vec.dot(v, v)]).total)
@@ -90,7 +85,7 @@ def momentum_equations(kinematics: Kinematics, method: str, kinetic: Expr, poten
     drift, total = jvp(momenta, kinematics.flow | kinematics.clock), kinematics.total_derivative(momenta)
     return TreeEquations(
         method=method,
-        mass_matrix=hessian(momenta, v),
+        mass=hessian(momenta, v),
         bias=tuple(d - r for d, r in zip(drift, rates, strict=True)),
         inverse_dynamics=tuple(d - r for d, r in zip(total, rates, strict=True)),
         kinetic_energy=kinetic,

@@ -11,7 +11,6 @@ from ...base.algebra import Array, correlated
 from ...base.limits.constraints import UNMOVED
 from ...base.limits.numbers import EPS, LEAST, NOTHING, SINGULAR, TINY, WORTH_A_WORD
 from ...base.ranks import partition
-from ...elements.frames import Frame, Marker
 from ...errors import EvaluationError, ModelError, PartitionError, Problem
 from ...expr.evaluate import Evaluator, evaluate
 from ...expr.records import dataclass
@@ -59,13 +58,13 @@ class IdleMotion:
 
     def _turning(self, kinematics: Kinematics) -> list[tuple[str, Sequence[float]]]:
         """Bodies that turn, and their axes in body axes."""
-        graph, motion = kinematics.graph, kinematics.motion
+        motion = kinematics.motion
         zero = dict.fromkeys(kinematics.velocity_names, 0.0)
         values = {**self.numbers, "t": 0.0, **dict(zip(kinematics.names, map(float, self.q), strict=True)), **zero}
         rates = dict(zip(kinematics.velocity_names, map(float, self.v), strict=True))
         result: list[tuple[str, np.ndarray]] = []
         for k, body in enumerate(kinematics.mechanism.bodies):
-            marker = Marker(k, Frame.identity(graph), body.name)
+            marker = motion.body(k)
             rotation = [x for row in motion.rotation(marker) for x in row]
             expressions = kinematics.resolve([*motion.angular_velocity(marker), *rotation])
             moving, still = (np.array(evaluate(expressions, values | part), dtype=float) for part in (rates, {}))

@@ -13,7 +13,7 @@ from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, dot, scaled
 from ...expr.tensors import add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ...expr.vectors import Mat3, Rows
-from ..tree import Link, SpatialInertia
+from ..tree import Link, SpatialInertia, ancestors
 
 # -- sweeps ------------------------------------------------------------------------------------------------------------
 
@@ -253,19 +253,12 @@ class ArticulatedBodies:
                 self.acting.setdefault(k, []).append(i)
             if not moving:
                 continue  # it holds nothing, and its multiplier is 0
-            common = set.intersection(*(set(self._path(k)) for k in moving))
-            place = max(common, default=GROUND)
+            common = set.intersection(*(set(ancestors(self.links, k)) for k in moving))
+            place = max(common)
             if place == GROUND:
                 self.at_ground.append(i)
             else:
                 (self.at_joint if place in moving else self.at_link).setdefault(place, []).append(i)
-
-    def _path(self, k: int) -> list[int]:
-        result = []
-        while k != GROUND:
-            result.append(k)
-            k = self.links[k].parent
-        return result
 
     def solve(self) -> TreeMotion:
         """Both sweeps."""

@@ -41,7 +41,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     tree = solve() if solve is not None and not kinematics.constraints.labels else None
     return TreeEquations(
         method="recursive",
-        mass_matrix=partial(composite_mass_matrix, kinematics.links, inertias),
+        mass=partial(composite_mass_matrix, kinematics.links, inertias),
         bias=_newton_euler(kinematics, inertias, products, loads, rest),
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),

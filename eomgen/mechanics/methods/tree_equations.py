@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
+from dataclasses import replace
 from functools import partial
 from types import FunctionType
 
@@ -15,6 +15,7 @@ from ...expr.vectors import Rows
 from ...model.equations import momenta_and_rates
 from .. import Kinematics
 from ..link_frames import Turned
+from ..wrenches import find_drives
 from .recursions import TreeMotion
 
 # -- what a method delivers --------------------------------------------------------------------------------------------
@@ -69,6 +70,7 @@ def linear_system(
     )
 
 
+@dataclass(eq=False, repr=False)
 class TreeEquations:
     """M(q) a + h(t, q, v, u) = generalized forces not in the model, on the coordinates of the spanning tree.
 
@@ -77,7 +79,7 @@ class TreeEquations:
     Attributes
     ----------
     method : str
-    mass_matrix : (n_v, n_v) rows, symmetric; may be given as a function and is then formed when it is first asked for
+    mass : (n_v, n_v) rows, symmetric, or a function that forms them; read by ``mass_matrix``
     bias : (n_v,) h, with gravity, force elements and inputs
     inverse_dynamics : (n_v,) M a + h formed in one go, cheaper than the product
     kinetic_energy, potential_energy : J; gravity and springs
@@ -89,52 +91,29 @@ class TreeEquations:
     constrained : (rows, term) -> what the constraints' multipliers leave of the accelerations, of a method that has it
     """
 
-    def __init__(
-        self,
-        method: str,
-        mass_matrix: Rows | Callable[[], Rows],
-        bias: tuple[Expr, ...],
-        inverse_dynamics: tuple[Expr, ...],
-        kinetic_energy: Expr,
-        potential_energy: Expr,
-        accelerations: tuple[Expr, ...] | None = None,
-        pivots: tuple[Expr, ...] = (),
-        system: LinearSystem | None = None,
-        canonical: tuple[Expr, ...] = (),
-        turned: Turned | None = None,
-        constrained: Callable[..., TreeMotion] | None = None,
-    ) -> None:
-        if isinstance(mass_matrix, FunctionType) or isinstance(constrained, FunctionType):
+    method: str
+    mass: Rows | Callable[[], Rows]
+    bias: tuple[Expr, ...]
+    inverse_dynamics: tuple[Expr, ...]
+    kinetic_energy: Expr
+    potential_energy: Expr
+    accelerations: tuple[Expr, ...] | None = None
+    pivots: tuple[Expr, ...] = ()
+    system: LinearSystem | None = None
+    canonical: tuple[Expr, ...] = ()
+    turned: Turned | None = None
+    constrained: Callable[..., TreeMotion] | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.mass, FunctionType) or isinstance(self.constrained, FunctionType):
             raise TypeError("a function that holds expressions is not copied with them: give a functools.partial")
-        self.method = method
-        self._mass_matrix = mass_matrix
-        self.bias = bias
-        self.inverse_dynamics = inverse_dynamics
-        self.kinetic_energy = kinetic_energy
-        self.potential_energy = potential_energy
-        self.accelerations = accelerations
-        self.pivots = pivots
-        self.system = system
-        self.canonical = canonical
-        self.turned = turned
-        self.constrained = constrained
-
-    def without_accelerations(self) -> TreeEquations:
-        """The same equations, to be solved with M."""
-        same = copy(self)
-        same.accelerations, same.pivots = None, ()
-        return same
-
-    def take_mass_matrix(self, other: TreeEquations | Callable[[], Rows]) -> None:
-        """Have the mass matrix of the same system by another method, or as a function."""
-        self._mass_matrix = other._mass_matrix if isinstance(other, TreeEquations) else other
 
     @property
     def mass_matrix(self) -> Rows:
-        """M, row by row."""
-        if callable(self._mass_matrix):
-            self._mass_matrix = self._mass_matrix()
-        return self._mass_matrix
+        """M, row by row, formed when it is first asked for."""
+        if callable(self.mass):
+            self.mass = self.mass()
+        return self.mass
 
 
 Method = Callable[[Kinematics], TreeEquations]
@@ -161,34 +140,19 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
 
     Accelerations that a method has without M, and a turned system, must hold the inertia of drives already.
     """
-    drives = [(s.coordinates[0], s.armature) for s in kinematics.mechanism.joints if s.armature is not None]
-    if not drives:
+    if not (drives := find_drives(kinematics)):
         return tree
-    graph, loop = kinematics.graph, kinematics.loop_coordinates
-    n = len(kinematics.v)
     bias, inverse, kinetic = list(tree.bias), list(tree.inverse_dynamics), tree.kinetic_energy
-    still = dict.fromkeys(kinematics.a, graph.zero)
-    slopes: list[tuple[Expr, list[Expr]]] = []
-    for name, inertia in drives:
-        if name in kinematics.velocity_labels:
-            k = kinematics.velocity_labels.index(name)
-            slope: list[Expr] = [graph.one if j == k else graph.zero for j in range(n)]
-            rate, acceleration, rest = kinematics.v[k], kinematics.a[k], graph.zero
-        else:
-            k = loop.names.index(name)
-            slope, rate, acceleration = list(loop.jacobian[k]), loop.rates[k], loop.accelerations[k]
-            rest = substitute([acceleration], still)[0]
-        slopes.append((inertia, slope))
-        for i in range(n):
-            if not slope[i].is_zero:
-                bias[i] = bias[i] + inertia * (slope[i] * rest)
-                inverse[i] = inverse[i] + inertia * (slope[i] * acceleration)
-        kinetic = kinetic + 0.5 * inertia * (rate * rate)
-
-    same = copy(tree)
-    same.take_mass_matrix(partial(_mass_matrix, tree, slopes))
-    same.bias, same.inverse_dynamics, same.kinetic_energy = tuple(bias), tuple(inverse), kinetic
-    return same
+    still = dict.fromkeys(kinematics.a, kinematics.graph.zero)
+    for drive in drives:
+        rest = substitute([drive.acceleration], still)[0]
+        for i, slope in enumerate(drive.slope):
+            if not slope.is_zero:
+                bias[i] = bias[i] + drive.inertia * (slope * rest)
+                inverse[i] = inverse[i] + drive.inertia * (slope * drive.acceleration)
+        kinetic = kinetic + drive.kinetic_energy
+    mass = partial(_mass_matrix, tree, [(drive.inertia, drive.slope) for drive in drives])
+    return replace(tree, mass=mass, bias=tuple(bias), inverse_dynamics=tuple(inverse), kinetic_energy=kinetic)
 
 
 def _mass_matrix(tree: TreeEquations, slopes: Sequence[tuple[Expr, Sequence[Expr]]]) -> Rows:
@@ -223,7 +187,7 @@ def direct_equations(kinematics: Kinematics, method: str = GIVEN) -> TreeEquatio
         moved = [d - r for d, r in zip(kinematics.total_derivative(momenta), rates, strict=True)]
     return TreeEquations(
         method=method,
-        mass_matrix=mass,
+        mass=mass,
         bias=bias,
         inverse_dynamics=tuple(moved),
         kinetic_energy=equations.kinetic_energy,
