@@ -16,7 +16,8 @@ from ..expr.tensors import skew
 from ..expr.vectors import Mat3, Vec3
 from ..model.mechanism import JointSpec
 from .kinematics import Kinematics, joint_rates
-from .tree import JointRates, Turns
+from .loops import closing_equations, turns_about_z
+from .tree import JointRates
 
 # -- rows of C_q -------------------------------------------------------------------------------------------------------
 
@@ -40,7 +41,6 @@ class ClosingGradients:
     labels: tuple[str, ...]
     gradients: tuple[tuple[Vec3, Vec3], ...]  #: of the equations, then of the coordinates
     common: bool
-    in_turns: bool
 
 
 class PoseEquations(NamedTuple):
@@ -52,36 +52,18 @@ class PoseEquations(NamedTuple):
     position: Vec3
     turn: Expr
     true: dict[Expr, Expr]
-    in_turns: bool
 
 
 def pose_equations(kinematics: Kinematics, spec: JointSpec) -> PoseEquations:
     """The equations of a cut joint with its relative pose not put in."""
-    graph, poses = kinematics.graph, kinematics.poses
-    pose = poses.relative(spec.predecessor, spec.successor)
-    rotation, position = pose.rotation, pose.position
-    R, r = pose_symbols(graph, "")
-    turn = graph.symbol("turn(z)")
-    angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
-    turns = turns_about_z(kinematics, spec)
-    if turns is None:
-        rows = spec.joint.closure(graph, R, r)
-    else:
-        rows = spec.joint.closure_in_turns(graph, R, r, turn)
-    measured = spec.joint.measure(graph, R, r)
-    if turns is not None:
-        measured[angles[0]] = turn
-    true = put_pose(R, r, rotation, position) | ({turn: turns[0]} if turns is not None else {})
+    pose = kinematics.poses.relative(spec.predecessor, spec.successor)
+    R, r = pose_symbols(kinematics.graph, "")
+    turn = kinematics.graph.symbol("turn(z)")
+    turns = turns_about_z(spec, kinematics.poses, kinematics.q)
+    rows, measured = closing_equations(spec, Frame(R, r), None if turns is None else turn)
+    true = put_pose(R, r, pose.rotation, pose.position) | ({} if turns is None else {turn: turns[0]})
     expressions = [*(row.expression for row in rows), *measured]
-    return PoseEquations(tuple(row.label for row in rows), expressions, R, r, turn, true, turns is not None)
-
-
-def turns_about_z(kinematics: Kinematics, spec: JointSpec) -> Turns | None:
-    """What :meth:`.tree.Poses.turns` finds of a cut joint with one angle."""
-    if sum(coordinate.kind == "angle" for coordinate in spec.joint.coordinates) != 1:
-        return None
-    rotation = kinematics.poses.relative(spec.predecessor, spec.successor).rotation
-    return kinematics.poses.turns(rotation, kinematics.q)
+    return PoseEquations(tuple(row.label for row in rows), expressions, R, r, turn, true)
 
 
 def pose_symbols(graph: Graph, of: str) -> tuple[Mat3, Vec3]:
@@ -99,7 +81,7 @@ def put_pose(R: Mat3, r: Vec3, rotation: Mat3, position: Vec3) -> dict[Expr, Exp
 def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradients:
     """Differentiate the equations of a cut joint by its relative pose."""
     graph = kinematics.graph
-    labels, expressions, R, r, turn, true, in_turns = pose_equations(kinematics, spec)
+    labels, expressions, R, r, turn, true = pose_equations(kinematics, spec)
     entries = jacobian(expressions, [*r, *(R[i][k] for k in range(3) for i in range(3)), turn])
     gradients: list[tuple[Vec3, Vec3]] = []
     for k in range(len(expressions)):
@@ -110,7 +92,7 @@ def closing_gradients(kinematics: Kinematics, spec: JointSpec) -> ClosingGradien
             moment = vec.add(moment, vec.cross(column, (d[3 + 3 * c], d[4 + 3 * c], d[5 + 3 * c])))
         x = substitute([d[0], d[1], d[2], *moment], true)
         gradients.append(((x[0], x[1], x[2]), (x[3], x[4], x[5])))
-    return ClosingGradients(labels, tuple(gradients), set(labels).issuperset(COMMON), in_turns)
+    return ClosingGradients(labels, tuple(gradients), set(labels).issuperset(COMMON))
 
 
 def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:
@@ -133,7 +115,7 @@ def shortest_rows(kinematics: Kinematics) -> tuple[tuple[Expr, ...], ...]:
 def twist_rows(kinematics: Kinematics, cut: int) -> dict[str, tuple[Expr, ...]]:
     """Rows of a cut joint by their labels; none of one whose loop lies in a plane, where derivatives are sums."""
     graph, poses, spec = kinematics.graph, kinematics.poses, kinematics.mechanism.joints[cut]
-    if turns_about_z(kinematics, spec) is not None:
+    if turns_about_z(spec, poses, kinematics.q) is not None:
         return {}
     base, within = poses.between(spec.predecessor, spec.successor)
     closing = closing_gradients(kinematics, spec)
@@ -205,9 +187,9 @@ def end_gammas(kinematics: Kinematics) -> dict[str, Expr]:
 def _gamma(kinematics: Kinematics, rates: Sequence[JointRates], cut: int) -> dict[str, Expr]:
     """Gamma of the rows of a cut joint by their labels; none of one whose loop lies in a plane."""
     graph, poses, spec = kinematics.graph, kinematics.poses, kinematics.mechanism.joints[cut]
-    if turns_about_z(kinematics, spec) is not None:
+    if turns_about_z(spec, poses, kinematics.q) is not None:
         return {}
-    labels, expressions, R, r, _, true, _ = pose_equations(kinematics, spec)
+    labels, expressions, R, r, _, true = pose_equations(kinematics, spec)
     first, second = _end(kinematics, rates, spec.predecessor, spec), _end(kinematics, rates, spec.successor, spec)
     (R_rate, r_rate), (R_second, r_second) = pose_symbols(graph, "'"), pose_symbols(graph, "''")
     along = put_pose(R, r, R_rate, r_rate)

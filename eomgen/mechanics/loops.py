@@ -12,7 +12,8 @@ from ..base.limits.numbers import ROUNDED
 from ..elements.constraints import Equation, RollingDisc
 from ..elements.constraints.constraint import ALLOWED, VELOCITY, Condition
 from ..elements.forces import Line, Route
-from ..elements.frames import Marker, WrapCylinder
+from ..elements.frames import Frame, Marker, WrapCylinder
+from ..elements.joints import Closure
 from ..errors import ModelError, Problem
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute, symbols_of
@@ -25,7 +26,7 @@ from ..expr.vectors import Vec3
 from ..model.mechanism import JointSpec, Mechanism
 from .motion import MarkerMotion
 from .topology import MotionSymbols
-from .tree import Poses
+from .tree import Poses, Turns
 
 # -- cut joints --------------------------------------------------------------------------------------------------------
 
@@ -90,28 +91,43 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     The angle of a joint that turns about one axis is a sum of the tree's angles if the loop lies in a plane; elsewhere
     it is measured between -pi and pi.
     """
-    graph = poses.graph
     outer, inner = poses.pair(spec.predecessor, spec.successor)
-    rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
+    pose = poses.relative(spec.predecessor, spec.successor)
     gap = vec.sub(inner.position, outer.position)
-    position = vec.transpose_times(outer.rotation, gap)
-    angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
-    turns = poses.turns(rotation, q) if len(angles) == 1 else None
-    if turns is not None:
-        rows = spec.joint.closure_in_turns(graph, rotation, position, turns[0])
-    else:
-        rows = spec.joint.closure(graph, rotation, position)
+    turns = turns_about_z(spec, poses, q)
+    rows, measured = closing_equations(spec, pose, None if turns is None else turns[0])
     if {r.label for r in rows} >= {"r_x", "r_y", "r_z"}:  # all three vanish: any axes do, common ones are simplest
         if turns is not None:
             gap = _in_plane(gap, (outer.rotation[0][2], outer.rotation[1][2], outer.rotation[2][2]))
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
-    measured = spec.joint.measure(graph, rotation, position)
-    if turns is not None:
-        measured[angles[0]] = turns[0]
     labelled = [Row(f"{spec.name}.{r.label}", r.expression, r.kind) for r in rows]
-    wrapping = [] if turns is not None or spec.joint.counts_turns else [spec.coordinates[k] for k in angles]
-    return ClosedLoop(labelled, measured, spec.joint.aligned(rotation), wrapping)
+    wraps = turns is None and not spec.joint.counts_turns
+    wrapping = [spec.coordinates[k] for k in _angles(spec)] if wraps else []
+    return ClosedLoop(labelled, measured, spec.joint.aligned(pose.rotation), wrapping)
+
+
+def _angles(spec: JointSpec) -> list[int]:
+    """Which coordinates of a joint are angles."""
+    return [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
+
+
+def turns_about_z(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> Turns | None:
+    """The one angle of a cut joint as a sum of the tree's angles, where the loop lies in a plane."""
+    if len(_angles(spec)) != 1:
+        return None
+    return poses.turns(poses.relative(spec.predecessor, spec.successor).rotation, q)
+
+
+def closing_equations(spec: JointSpec, pose: Frame, turn: Expr | None) -> tuple[list[Closure], list[Expr]]:
+    """Equations and coordinates of a cut joint as functions of the pose of S in P, and of its turn in a plane loop."""
+    graph, rotation, position = pose.position[0].graph, pose.rotation, pose.position
+    if turn is None:
+        return spec.joint.closure(graph, rotation, position), spec.joint.measure(graph, rotation, position)
+    rows = spec.joint.closure_in_turns(graph, rotation, position, turn)
+    measured = spec.joint.measure(graph, rotation, position)
+    measured[_angles(spec)[0]] = turn
+    return rows, measured
 
 
 def _in_plane(gap: Vec3, axis: Vec3) -> Vec3:

@@ -14,14 +14,12 @@ from ..elements.forces import CoordinateLoad, MarkerLoad
 from ..elements.forces.force import Force, Load, View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
-from ..expr.differentiate import jacobian
 from ..expr.identity import vanishes
 from ..expr.records import dataclass
-from ..expr.vectors import Vec3
 from ..model.mechanism import Switched
 from .kinematics import ForceTerms, Kinematics
 from .loops import couple, differentiate_constraints, refuse_rows_of_time, refuse_unusable
-from .wrenches import JointWrenches, Row6
+from .wrenches import JointWrenches, Row6, virtual_power
 
 #: Operations whose results are numbers whatever numbers they are given.
 FINITE = {"sym", "const", "add", "sub", "mul", "neg", "sin", "cos", "abs", "min", "max", "lt", "le", "eq", "select"}
@@ -114,22 +112,13 @@ def _while_closed(switch: Switched, x: Expr) -> Expr:
 def _load(kinematics: Kinematics, body: int, D: Row6, multiplier: Expr) -> MarkerLoad:
     """The wrench -l D on a body, about its origin."""
     x = [-(d * multiplier) for d in D]
-    return MarkerLoad(kinematics.motion.body(body), (x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    return MarkerLoad(kinematics.motion.body(body), vec.three(x, 0), vec.three(x, 3))
 
 
 def _left(kinematics: Kinematics, J: Sequence[Expr], on_bodies: dict[int, Row6]) -> list[Expr]:
     """What of a row acts along coordinates of the tree, beyond the wrenches on bodies."""
     if not on_bodies:
         return list(J)
-    graph, total = kinematics.graph, list(J)
-    for body, D in on_bodies.items():
-        marker = kinematics.motion.body(body)
-        v, w = kinematics.motion.velocity(marker), kinematics.motion.angular_velocity(marker)
-        slopes = jacobian([*v, *w], list(kinematics.v))
-        for j in range(len(total)):
-            column = [slopes.get((k, j), graph.zero) for k in range(6)]
-            first: Vec3 = (column[0], column[1], column[2])
-            second: Vec3 = (column[3], column[4], column[5])
-            work = vec.dot((D[0], D[1], D[2]), first) + vec.dot((D[3], D[4], D[5]), second)
-            total[j] = total[j] - work
-    return [graph.zero if vanishes([x])[0] else x for x in total]
+    loads = [MarkerLoad(kinematics.motion.body(k), vec.three(D, 0), vec.three(D, 3)) for k, D in on_bodies.items()]
+    total = [x - y for x, y in zip(J, virtual_power(kinematics, loads), strict=True)]
+    return [kinematics.graph.zero if zero else x for x, zero in zip(total, vanishes(total), strict=True)]

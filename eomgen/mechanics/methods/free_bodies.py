@@ -14,7 +14,7 @@ from ...expr.core import Expr, substitute
 from ...expr.differentiate import hessian, jacobian, jvp
 from ...expr.records import dataclass
 from ...expr.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
-from ...expr.tensors import combined, skew
+from ...expr.tensors import combined, skew, solve_symmetric
 from ...expr.vectors import Rows
 from ...model.mechanism import JointSpec
 from .. import Kinematics
@@ -234,9 +234,13 @@ def _differentiate(
 # M and h, which other calls of a module want, come from the same balances, summed from the tips inwards.
 
 
-def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:
-    """What a method offers beside its linear system: M, h and energies from the balances of the bodies."""
+def free_body_equations(kinematics: Kinematics, method: str, with_joints: bool) -> TreeEquations:
+    """The linear system of a method, with M, h and energies from the balances of the bodies.
+
+    ``with_joints``: the accelerations of joint coordinates are unknowns too.
+    """
     bodies = FreeBodies(kinematics)
+    system = _system(bodies, with_joints)
     inverse = _inverse_dynamics(bodies)
     return TreeEquations(
         method=method,
@@ -247,6 +251,43 @@ def free_body_equations(kinematics: Kinematics, method: str, system: LinearSyste
         potential_energy=potential_energy(kinematics),
         system=system,
     )
+
+
+def _system(bodies: FreeBodies, with_joints: bool) -> LinearSystem:
+    kinematics = bodies.kinematics
+    unknowns, units = Unknowns(kinematics), Units(kinematics)
+    rates = [units.of(kind) for kind in kinematics.velocity_kinds]
+    motions: list[Twist] = []
+    reactions: list[Wrench] = []
+    a: list[Expr] = []
+    for link in kinematics.links:
+        motions.append(unknowns.six(units.motion))
+        if with_joints:
+            a += unknowns.take(rates[link.first : link.first + len(link.columns)])
+        reactions.append(unknowns.six(units.wrench))
+    relative = [bodies.relative(k, motions) for k in range(len(motions))]
+    if not with_joints:  # a = S^+ of the relative acceleration
+        for link, motion in zip(kinematics.links, relative, strict=True):
+            gram = [[dot(x, y) for y in link.columns] for x in link.columns]
+            a += solve_symmetric(gram, [dot(column, motion) for column in link.columns])
+    forces = Forces(bodies, cut_joints(bodies), unknowns, units)
+    balances = bodies.balances(motions, reactions)
+    closing = forces.close(balances, motions, a)
+    residuals: list[Expr] = []
+    sizes: list[Expr] = []
+    for k, (link, balance, joint) in enumerate(zip(kinematics.links, balances, relative, strict=True)):
+        along = range(link.first, link.first + len(link.columns))
+        for j, column in zip(along, link.columns, strict=True):
+            joint = sub(joint, scaled(a[j], column))
+        powers = bodies.powers(k, reactions[k], a, forces.pulls)
+        if not with_joints:
+            # across the joint no relative acceleration, along it no force: parts of one vector, at right angles
+            for j, column, power in zip(along, link.columns, powers, strict=True):
+                joint = add(joint, scaled(power * (rates[j] * rates[j] / units.energy), column))
+            powers = []
+        residuals += [*joint[0], *joint[1], *powers, *balance[0], *balance[1]]
+        sizes += [*units.motion, *(units.force[j] for j in along if with_joints), *units.wrench]
+    return forces.solve(residuals, sizes, closing, a)
 
 
 def _inverse_dynamics(bodies: FreeBodies) -> list[Expr]:
