@@ -160,7 +160,7 @@ def compare(author: Author, module: Any) -> Difference:
         for what, key in keys.items():
             one = equations.as_formed(*key)
             formed, named = one.formed()
-            _compare_formed(result, what, formed, named, (one.named, one.flat), values)
+            _compare_formed(result, what, formed, named, one.written, values)
         for what, expressions, own in author.formed:
             _compare_formed(result, what, expressions, (), own, values)
     return Difference({name: one.finding().worst for name, one in result.items()}, STATES)

@@ -377,8 +377,8 @@ def forces(author: Author) -> list[Section]:
 def states(author: Author) -> Section | None:
     """The rates of the first-order states, None without any."""
     k = author.equations.kinematics
-    held = {name for clock in k.mechanism.clocks for name in (*clock.states, clock.counter)}
-    rates = [(name, x) for name, x in zip(k.state_names, k.state_rates, strict=True) if name not in held]
+    sampled = k.mechanism.sampled_names
+    rates = [(name, x) for name, x in zip(k.state_names, k.state_rates, strict=True) if name not in sampled]
     if not k.state_names:
         return None
     text = "Besides coordinates and velocities the model has states with these first-order equations."

@@ -48,17 +48,12 @@ RAISED = tuple(SIGNS[word] for word in ("prime", "star", "ast", "dagger", "circ"
 #: Spaces; those of no width at last.
 SPACES = {" ": " ", ",": " ", ":": " ", ";": " ", "quad": " ", "!": ""}
 
-#: Accents and the combining character of each; of ``vec`` none that terminals show.
+#: Accents: the combining character of each, of ``vec`` none that terminals show, and the sign over a letter in MathML.
 ACCENTS = {
-    "dot": "\u0307", "ddot": "\u0308", "dddot": "\u20db", "hat": "\u0302", "widehat": "\u0302", "bar": "\u0304",
-    "overline": "\u0305", "tilde": "\u0303", "widetilde": "\u0303", "vec": "\u20d7", "breve": "\u0306",
-    "check": "\u030c", "acute": "\u0301", "grave": "\u0300", "mathring": "\u030a", "underline": "\u0332",
-}  # fmt: skip
-#: Accents -> the sign over a letter in MathML.
-OVER = {
-    "dot": "˙", "ddot": "¨", "dddot": "˙˙˙", "hat": "^", "widehat": "^", "bar": "¯", "overline": "¯", "tilde": "~",
-    "widetilde": "~", "vec": "→", "breve": "˘", "check": "ˇ", "acute": "´", "grave": "`", "mathring": "˚",
-    "underline": "_",
+    "dot": ("\u0307", "˙"), "ddot": ("\u0308", "¨"), "dddot": ("\u20db", "˙˙˙"), "hat": ("\u0302", "^"),
+    "widehat": ("\u0302", "^"), "bar": ("\u0304", "¯"), "overline": ("\u0305", "¯"), "tilde": ("\u0303", "~"),
+    "widetilde": ("\u0303", "~"), "vec": ("\u20d7", "→"), "breve": ("\u0306", "˘"), "check": ("\u030c", "ˇ"),
+    "acute": ("\u0301", "´"), "grave": ("\u0300", "`"), "mathring": ("\u030a", "˚"), "underline": ("\u0332", "_"),
 }  # fmt: skip
 #: Derivatives by the time, by their order.
 DOTS = ("", "dot", "ddot", "dddot")
@@ -387,7 +382,7 @@ def _text(node: Node) -> str:
             body = _text(node.body)
             if node.accent in DOTS:
                 return body + "'" * DOTS.index(node.accent)
-            whole = unicodedata.normalize("NFC", body + ACCENTS[node.accent])
+            whole = unicodedata.normalize("NFC", body + ACCENTS[node.accent][0])
             return whole if len(whole) == 1 else body
         case Fraction():
             return f"{_grouped(node.above)}/{_grouped(node.below)}"
@@ -438,14 +433,14 @@ def html_form(node: Node, upright: bool = False) -> str:
 
 def _html_accent(node: Accent, upright: bool) -> str:
     """One letter with its accent where there is such a character; else a sign above the middle."""
-    letter = unicodedata.normalize("NFC", _text(node.body) + ACCENTS[node.accent])
+    letter = unicodedata.normalize("NFC", _text(node.body) + ACCENTS[node.accent][0])
     if len(letter) == 1:
         return letter if upright or isinstance(node.body, Styled) else f"<i>{letter}</i>"
     over = (
         "position:absolute;left:0;right:0;top:-0.28em;text-align:center;line-height:1;font-style:normal;"
         "pointer-events:none"
     )
-    sign = html_text(OVER[node.accent])
+    sign = html_text(ACCENTS[node.accent][1])
     inner = html_form(node.body, upright)
     return f"<span style='position:relative;display:inline-block'>{inner}<span style='{over}'>{sign}</span></span>"
 
@@ -464,7 +459,7 @@ def mathml_form(node: Node, style: str = "") -> str:
                 else mathml_form(node.body, node.style)
             )
         case Accent():
-            over = f"<mo{CLEAR if node.accent in DOTS else ''}>{html_text(OVER[node.accent])}</mo>"
+            over = f"<mo{CLEAR if node.accent in DOTS else ''}>{html_text(ACCENTS[node.accent][1])}</mo>"
             tag = "munder" if node.accent == "underline" else "mover accent='true'"
             tag = "mover" if node.accent in DOTS else tag  # as accents, browsers set dots on high letters
             return f"<{tag}>{mathml_form(node.body, style)}{over}</{tag.partition(' ')[0]}>"

@@ -304,6 +304,11 @@ class Mechanism:
     presentation: Presentation = Presentation()
 
     @property
+    def sampled_names(self) -> set[str]:
+        """States that clocks alone change, and the counters of the clocks."""
+        return {name for clock in self.clocks for name in (*clock.states, clock.counter)}
+
+    @property
     def bare(self) -> bool:
         """Whether there are no bodies: a Lagrangian, or equations, came instead."""
         return self.given is not None

@@ -17,7 +17,7 @@ from ..expr.core import Expr, substitute, symbols_of
 from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.tensors import dot, solve_symmetric
-from ..mechanics.methods.reduction import eliminate
+from ..mechanics.methods.reduction import solve_velocities
 from .methods import put_in
 from .quantities import Quantities, Row, Rows
 
@@ -198,7 +198,7 @@ def _displacement_name(quantities: Quantities, k: int) -> str:
 
 def _displacements(quantities: Quantities) -> tuple[list[int], Rows]:
     """Independent displacements and Z (n_v, n_z): all that the holonomic equations allow."""
-    kinematics, mobility, graph = quantities.kinematics, quantities.mobility, quantities.graph
+    kinematics, mobility = quantities.kinematics, quantities.mobility
     n, c = len(kinematics.v), kinematics.constraints
     free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
     if not c.nonholonomic:
@@ -211,15 +211,8 @@ def _displacements(quantities: Quantities) -> tuple[list[int], Rows]:
         free = [int(k) for k in partition(J, len(rows), order).independent]
     else:
         free = order
-    bound = [j for j in range(n) if j not in free]
-    solved = eliminate(kinematics, mobility, rows, bound, quantities.numbers)
-    unit = {j: k for k, j in enumerate(free)}
-    return free, tuple(
-        tuple(-solved[j][i] for i in free)
-        if j in solved
-        else tuple(graph.one if unit[j] == k else graph.zero for k in range(len(free)))
-        for j in range(n)
-    )
+    solved = solve_velocities(kinematics, mobility, rows, free, quantities.numbers)
+    return free, tuple(tuple(row[k] for k in free) for row in solved)
 
 
 def _move(quantities: Quantities, column: Row) -> _Move:

@@ -179,23 +179,21 @@ class PrintedEquations:
     @cached_property
     def states(self) -> list[tuple[Formula, Formula]]:
         """First-order states: their rates, and what these are, after named parts of the latter; no sampled ones."""
-        names, mechanism = self.equations.kinematics.state_names, self.equations.kinematics.mechanism
-        held = {name for clock in mechanism.clocks for name in (*clock.states, clock.counter)}
-        if held.issuperset(names):
-            return []
-        rates = self.equations.symbols_substituted([acceleration_name(name) for name in names])
-        named, column = self.equations.written("state_rates")
-        pairs = [(rate, x) for name, rate, x in zip(names, rates, column, strict=True) if name not in held]
-        return [(self.formula(left), self.formula(right)) for left, right in (*named, *pairs)]
+        names, sampled = self.equations.kinematics.state_names, self.equations.kinematics.mechanism.sampled_names
+        return self._pairs("state_rates", [None if n in sampled else acceleration_name(n) for n in names])
 
     @cached_property
     def sampled(self) -> list[tuple[Formula, Formula]]:
         """Sampled states and what they become, behind the time of the next sample, after named parts of these."""
-        names = [name for name, _ in self.equations.kinematics.sampled]
-        if not names:
+        return self._pairs("sampled_values", [name for name, _ in self.equations.kinematics.sampled])
+
+    def _pairs(self, quantity: str, names: Sequence[str | None]) -> list[tuple[Formula, Formula]]:
+        """Named parts of a column, then its entries that have names, each with what it is."""
+        if not (kept := [name for name in names if name is not None]):
             return []
-        named, column = self.equations.written("sampled_values")
-        pairs = (*named, *zip(self.equations.symbols_substituted(names), column, strict=True))
+        named, column = self.equations.written(quantity)
+        entries = [x for name, x in zip(names, column, strict=True) if name is not None]
+        pairs = (*named, *zip(self.equations.symbols_substituted(kept), entries, strict=True))
         return [(self.formula(left), self.formula(right)) for left, right in pairs]
 
     @property

@@ -283,24 +283,10 @@ class Quantities:
         whole, rotations = name_rotations(self.kinematics, whole)
         if not self._embeds or is_short(whole):
             return whole, rotations
-        return [*(x for row in self.mass_matrix_by_names for x in row), *self.force_by_names], self.by_names[0].given
-
-    @cached_property
-    def by_names(self) -> tuple[LoopNames, VelocityTransformation]:
-        """v = B v_i + b and v' = B v_i' + a in names of their entries."""
-        names = LoopNames(self.kinematics, self.mobility.independent)
-        return names, transform_velocities(self.kinematics, self.mobility, self.numbers, names)
-
-    @cached_property
-    def mass_matrix_by_names(self) -> Rows:
-        """M (n_dof, n_dof) in the names of B's entries, as the book writes it: B^T M B."""
-        return self.by_names[1].mass_matrix(self.equations.mass_matrix) if self._embeds else self.equations.mass_matrix
-
-    @cached_property
-    def force_by_names(self) -> Row:
-        """M v_i' (n_dof,) in the names of the entries of B and a."""
-        right = tuple(-h for h in self.equations.bias)
-        return self.by_names[1].force(self.equations.mass_matrix, right) if self._embeds else right
+        names = LoopNames(self.kinematics, self.mobility.independent)  # of entries of B and a, as the book writes it
+        B = transform_velocities(self.kinematics, self.mobility, self.numbers, names)
+        mass, right = self.equations.mass_matrix, [-h for h in self.equations.bias]
+        return [*(x for row in B.mass_matrix(mass) for x in row), *B.force(mass, right)], names.parts
 
     @cached_property
     def mass_matrix(self) -> Rows:

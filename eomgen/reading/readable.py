@@ -150,10 +150,9 @@ def _n_v(equations: Readable) -> int:
 
 
 class WrittenQuantity(NamedTuple):
-    """A quantity in SymPy, entry by entry, with its named parts; ``formed`` gives it as the derivation formed it."""
+    """A quantity in SymPy, entry by entry; ``formed`` gives it as the derivation formed it."""
 
-    named: list[tuple[Any, Any]]
-    flat: list[Any]
+    written: Written
     formed: Callable[[], tuple[list[Expr], Names]]
 
 
@@ -415,7 +414,7 @@ class Readable(ABC):
             formed[:] = [tree_parts(quantities, self.has_long_loops)]
             return formed[0].flat
 
-        written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].given))
+        written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].named))
         shapes = ((n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
         mass, force, C, gamma = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
         return TreeSystem(mass, force, C, gamma, formed[0].zeros)
@@ -626,7 +625,7 @@ class Readable(ABC):
             values = [*written.expressions, *(x for _, x in written.intermediates)]
             self._require_finite(name, values, f"with {self._view}")
         self._named[name] = written.intermediates
-        self._all[name] = WrittenQuantity(*written, lambda: self._form(choose, choose_names))
+        self._all[name] = WrittenQuantity(written, lambda: self._form(choose, choose_names))
         return written.expressions
 
     def in_sympy(

@@ -28,12 +28,12 @@ Named = list[tuple[str, Expr]]
 class TreeParts(NamedTuple):
     """All entries of M_t (n_v, n_v), f_t (n_v,), C (n_c, n_v) and gamma (n_c,), and what stands in them.
 
-    ``given`` are names and values that stand in them, in order; ``zeros`` the coordinates on which M and f do not
+    ``named`` are names and values that stand in them, in order; ``zeros`` the coordinates on which M and f do not
     depend, for which 0 stands in all parts.
     """
 
     flat: list[Expr]
-    given: Named
+    named: Named
     zeros: tuple[str, ...]
 
 

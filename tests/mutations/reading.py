@@ -17,8 +17,8 @@ FAULTS = (
     ),
     Fault(
         "read-velocity-offset", "transform_velocities",
-        "(b for _, b in rest)",
-        "(c for c, _ in rest)",
+        "row[n + 1]",
+        "row[n]",
         "b of v = B v_i + b is that of accelerations",
         "tests/shown/test_shown_is_compiled.py::test_of_every_example[car_axis]",
     ),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from models import EXAMPLES
+from models import EXAMPLES, MODELS
 from shown_numbers import METHODS, evaluate, number, random_state, state_values
 from sweeps import part_of
 
@@ -245,6 +245,15 @@ def test_equations_near_a_state_are_those_of_the_module(name: str) -> None:
     flat = evaluate(near.intermediates, [*near.A, *near.B], c.values)
     np.testing.assert_allclose(flat[: n * n].reshape(n, n), wanted.A, atol=1e-10 * np.abs(wanted.A).max())
     np.testing.assert_allclose(flat[n * n :].reshape(n, -1), wanted.B, rtol=1e-10, atol=1e-10)
+
+
+def test_equations_with_nonholonomic_constraints_alone_near_a_state() -> None:
+    equations = MODELS["skate"].build().derive()
+    place = {"x": 0.1, "y": 0.4, "phi": -0.2}
+    near = equations.linearize(at=place)
+    wanted = equations.compile(target="numpy").linearize([*place.values(), 0.0, 0.0, 0.0])
+    assert near.states == wanted.states
+    agree(np.array(near.A, dtype=float), wanted.A)
 
 
 # -- large loops, shown by their parts --------------------------------------------------------------------------------

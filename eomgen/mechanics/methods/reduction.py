@@ -53,28 +53,37 @@ def transform_velocities(
 
     With ``names`` what loops give is named on the way; the names then stand as symbols in B, b and a.
     """
-    graph, n = kinematics.graph, len(kinematics.v)
+    n, c = len(kinematics.v), kinematics.constraints
     free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
-    bound = [j for j in range(n) if j not in free]
-    c = kinematics.constraints
     rows = [[*c.jacobian[i], c.gamma[i], c.time_derivative[i]] for i in mobility.independent_rows]
+    solved = solve_velocities(kinematics, mobility, rows, free, values, names)
+    matrix = tuple(tuple(row[k] for k in free) for row in solved)
+    return VelocityTransformation(matrix, tuple(row[n + 1] for row in solved), tuple(row[n] for row in solved))
+
+
+def solve_velocities(
+    kinematics: Kinematics,
+    mobility: Mobility,
+    rows: Sequence[Sequence[Expr]],
+    free: Sequence[int],
+    values: Mapping[str, float],
+    names: LoopNames | None = None,
+) -> list[list[Expr]]:
+    """Each velocity of the tree by the columns of the rows: those in ``free``, and those behind the velocities."""
+    zero, one, n = kinematics.graph.zero, kinematics.graph.one, len(kinematics.v)
+    bound = [j for j in range(n) if j not in free]
     solved = eliminate(kinematics, mobility, rows, bound, values, names) if bound else {}
-    unit = {j: k for k, j in enumerate(free)}
-    matrix = [
-        tuple(graph.one if unit[j] == k else graph.zero for k in range(len(free)))
-        if j in unit
-        else tuple(-solved[j][i] for i in free)
-        for j in range(n)
+    width = max(map(len, rows), default=n + 2)
+    return [
+        [-x for x in solved[j]] if j in solved else [one if k == j else zero for k in range(width)] for j in range(n)
     ]
-    rest = [(graph.zero, graph.zero) if j in unit else (-solved[j][n], -solved[j][n + 1]) for j in range(n)]
-    return VelocityTransformation(tuple(matrix), tuple(b for _, b in rest), tuple(c for c, _ in rest))
 
 
 class LoopNames:
     """Names for what is formed on the way to the dependent velocities."""
 
     def __init__(self, kinematics: Kinematics, independent: Sequence[str]) -> None:
-        self.given: list[tuple[str, Expr]] = []  #: names, which stand as symbols in what follows, and their values
+        self.parts: list[tuple[str, Expr]] = []  #: names, which stand as symbols in what follows, and their values
         self._graph = kinematics.graph
         self._labels, n = kinematics.velocity_labels, len(kinematics.v)
         self._columns = {n: "a", n + 1: "b"} | {
@@ -99,7 +108,7 @@ class LoopNames:
             return value
         name = next(x for x in chain([name], (f"{name}_{k}" for k in count(1))) if x not in self._taken)
         self._taken.add(name)
-        self.given.append((name, value))
+        self.parts.append((name, value))
         return self._graph.symbol(name)
 
 
