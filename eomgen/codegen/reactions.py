@@ -276,7 +276,7 @@ def _shared(
 ) -> set[str]:
     """Names of values that multipliers change which leave the motion as it is: C_q^T l = 0."""
     mechanism = kinematics.mechanism
-    numbers = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
+    numbers = mechanism.declared
     every = {symbol.node[1] for symbol in values}
     if mobility.assumed or any(value is None for value in numbers.values()):
         return every

@@ -276,6 +276,11 @@ class ConstraintFunctions:
         aligned = self._compile(list(c.aligned)) if c.aligned else None
         self.system = ConstraintSystem(position, place, kinematics.names, kinematics.kinds, c.labels, cut, aligned)
 
+    @classmethod
+    def at_declared(cls, kinematics: Kinematics) -> ConstraintFunctions:
+        """With the declared parameters and inputs, 0 where there is none."""
+        return cls(kinematics, {name: float(x or 0.0) for name, x in kinematics.mechanism.declared.items()})
+
     def _compile(self, outputs: Sequence[Expr]) -> Callable[[Array, float], Array]:
         evaluator, rest = Evaluator(list(outputs), self._names), list(self.values.values())
 

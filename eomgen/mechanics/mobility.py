@@ -137,188 +137,149 @@ def rate_candidates(rows: SparseRows, chosen: Sequence[int]) -> dict[int, float]
 FIRST, STEPS = 1e-3, 16  #: part of the span in the first step of a motion over it; its steps at most
 
 
-def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
-    """Row -> name of its driver."""
-    labels = functions.kinematics.constraints.labels
-    names = {c.name for c in functions.kinematics.mechanism.constraints if isinstance(c, Driver)}
-    result = {i: label.partition(".")[0] for i, label in enumerate(labels)}
-    return {i: name for i, name in result.items() if name in names}
+class Drivers:
+    """The drivers of a mechanism, by the constraint rows that they prescribe."""
 
+    def __init__(self, functions: ConstraintFunctions) -> None:
+        self.functions, self.kinematics = functions, functions.kinematics
+        self.labels = self.kinematics.constraints.labels
+        names = {c.name for c in self.kinematics.mechanism.constraints if isinstance(c, Driver)}
+        named = {i: label.partition(".")[0] for i, label in enumerate(self.labels)}
+        self.names = {i: name for i, name in named.items() if name in names}  #: row -> name
+        self.others = [i for i in range(functions.m) if i not in self.names]
 
-def close_driven(functions: ConstraintFunctions, values: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
-    """Assemble at t = 0; where that fails for the drivers, or more of them than freedoms contradict, say so."""
-    drivers = driver_rows(functions)
-    try:
-        result = functions.close_nearest(values, guess)
-    except AssemblyError as error:
-        if not drivers:
-            raise
-        raise _explain(functions, drivers, values, guess, error) from None
-    if drivers:
-        _refuse_contradictions(functions, drivers, result.q)
-    return result
-
-
-def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
-    """Closed positions at later times, as further samples; none without drivers, or where they cannot be followed."""
-    drivers = driver_rows(functions)
-    jacobian = [e for row in functions.kinematics.constraints.jacobian for e in row]
-    if not drivers or "t" in symbols_of(jacobian):
-        return []
-    return [position for _, position in _follow(functions.system, q, functions)][1::4]
-
-
-def _follow(system: ConstraintSystem, q: Array, functions: ConstraintFunctions) -> list[tuple[float, Array]]:
-    """Closed positions at times after 0, a small motion apart."""
-    end = functions.kinematics.mechanism.defaults.simulation.end
-    continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
-    continuation.step = FIRST
-    continuation.to(1.0, steps=STEPS)
-    return [(point.s * end, point.q) for point in continuation.points[1:]]
-
-
-def _guess(functions: ConstraintFunctions, q: Array) -> dict[str, float]:
-    """Coordinates of a position, but for those that have a better guess of their own."""
-    hinted = {name for name, _ in functions.kinematics.hints}
-    return {n: float(x) for n, x in zip(functions.kinematics.names, q, strict=True) if n not in hinted}
-
-
-def _others(functions: ConstraintFunctions, drivers: Sequence[int]) -> list[int]:
-    return [i for i in range(functions.m) if i not in drivers]
-
-
-def _needed(
-    functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array, t: float = 0.0
-) -> tuple[list[int], list[int]]:
-    """Rows that count at a position, drivers in order as long as they add something; and the drivers left over."""
-    J = functions.scaled_jacobian(q, t)
-    kept = _others(functions, list(drivers))
-    spare = []
-    for row in drivers:
-        if rank(J[[*kept, row]]).rank > rank(J[kept]).rank:
-            kept.append(row)
-        else:
-            spare.append(row)
-    return sorted(kept), spare
-
-
-def _explain(
-    functions: ConstraintFunctions,
-    drivers: Mapping[int, str],
-    wanted: Mapping[str, float],
-    guess: Mapping[str, float],
-    error: AssemblyError,
-) -> AssemblyError | ModelError:
-    """Why the mechanism cannot be assembled with its drivers."""
-    free = functions.with_rows(_others(functions, list(drivers)))
-    try:
-        q = functions.close(wanted, guess, system=free).q
-    except AssemblyError as loops:
-        return loops  # not for the drivers' sake
-    with np.errstate(all="ignore"):
-        values = functions.position(q)[0]
-    lost = [i for i in drivers if not np.isfinite(values[i])]
-    if lost:
-        names, labels = [drivers[i] for i in lost], functions.kinematics.constraints.labels
-        return AssemblyError(
-            f"{', '.join(names)} has no finite value at t = 0: {TO_BE_FINITE}",
-            [labels[i] for i in lost],
-            code="EG-NOT-FINITE",
-        )
-    kept, spare = _needed(functions, drivers, q)
-    if spare:
+    def assemble(self, values: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+        """Assemble at t = 0; where that fails for the drivers, or more of them than freedoms contradict, say so."""
         try:
-            q = functions.close(wanted, guess, system=functions.with_rows(kept)).q
-        except AssemblyError:
-            pass
-        else:
-            return _contradiction(functions, drivers, spare, q, 0.0)
-    if wanted:
+            result = self.functions.close_nearest(values, guess)
+        except AssemblyError as error:
+            if not self.names:
+                raise
+            raise self._explain(values, guess, error) from None
+        if self.names:
+            self._refuse_contradictions(result.q)
+        return result
+
+    def later(self, q: Array) -> list[Array]:
+        """Closed positions at later times, as further samples; none without drivers, or where none can be followed."""
+        if not self.names or "t" in symbols_of([e for row in self.kinematics.constraints.jacobian for e in row]):
+            return []
+        return [position for _, position in self._follow(self.functions.system, q)][1::4]
+
+    def _follow(self, system: ConstraintSystem, q: Array) -> list[tuple[float, Array]]:
+        """Closed positions at times after 0, a small motion apart."""
+        end = self.kinematics.mechanism.defaults.simulation.end
+        continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
+        continuation.step = FIRST
+        continuation.to(1.0, steps=STEPS)
+        return [(point.s * end, point.q) for point in continuation.points[1:]]
+
+    def _needed(self, q: Array, t: float = 0.0) -> tuple[list[int], list[int]]:
+        """Rows that count at a position, drivers in order as long as they add something; and the drivers left over."""
+        J, kept, spare = self.functions.scaled_jacobian(q, t), [*self.others], []
+        for row in self.names:
+            if rank(J[[*kept, row]]).rank > rank(J[kept]).rank:
+                kept.append(row)
+            else:
+                spare.append(row)
+        return sorted(kept), spare
+
+    def _explain(
+        self, wanted: Mapping[str, float], guess: Mapping[str, float], error: AssemblyError
+    ) -> AssemblyError | ModelError:
+        """Why the mechanism cannot be assembled with its drivers."""
+        functions, drivers = self.functions, self.names
         try:
-            functions.close({}, {**guess, **wanted})
-        except AssemblyError:
-            pass
-        else:
-            held = f"{error}; at t = 0 the drivers prescribe {', '.join(drivers.values())} too"
-            return AssemblyError(held, error.rows, code="EG-CONTRADICTION")
-    C = functions.position(q)[0]
-    gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
-    rows = [functions.kinematics.constraints.labels[i] for i in drivers]
-    text = str(error).partition("; check")[0]
-    phrases = (
-        f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest to "
-        f"the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values within "
-        "reach, or a guess nearer to them"
-    )
-    return AssemblyError(phrases, [*rows, *error.rows], code="EG-CONTRADICTION")
-
-
-def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> None:
-    """Follow the drivers that count; those left over must agree with them."""
-    kept, spare = _needed(functions, drivers, q)
-    if not spare:
-        return
-    for t, here in _follow(functions.with_rows(kept), q, functions):
-        if len(_needed(functions, drivers, here, t)[0]) > len(kept):
-            break  # the first position was singular; elsewhere all of them count
-        C = functions.scales.residual(functions.position(here, t)[0])
-        if np.abs(C[spare]).max() > CONTRADICTION:
-            raise _contradiction(functions, drivers, spare, here, t)
-
-
-def _contradiction(
-    functions: ConstraintFunctions, drivers: Mapping[int, str], spare: Sequence[int], q: Array, t: float
-) -> ModelError:
-    mechanism = functions.kinematics.mechanism
-    C = functions.position(q, t)[0]
-    deaf = [row for row in spare if not _felt(functions, drivers, row, q)]
-    others = [name for row, name in drivers.items() if row not in spare]
-    freedoms = len(others)
-    problems = []
-    for row in spare:
-        gap = f"{abs(C[row]):.3g} {_unit(functions, row)} at t = {t:.4g} s"
-        verb = "moves" if freedoms == 1 else "move"
-        who = f"{' and '.join(others)} {verb} it already" if others else "the mechanism cannot move"
-        if row in deaf:
-            problems.append(
-                mechanism.problem(
-                    f"constraints.{drivers[row]}",
-                    "the driver has no effect: no motion of the mechanism changes the quantity that it prescribes, "
-                    f"and this is off by {gap}",
-                    "drive a coordinate, or two markers that move relative to each other",
-                    "EG-REDUNDANT",
-                )
-            )
-            continue
+            q = functions.close(wanted, guess, system=functions.with_rows(self.others)).q
+        except AssemblyError as loops:
+            return loops  # not for the drivers' sake
+        with np.errstate(all="ignore"):
+            values = functions.position(q)[0]
+        lost = [i for i in drivers if not np.isfinite(values[i])]
+        if lost:
+            text = f"{', '.join(drivers[i] for i in lost)} has no finite value at t = 0: {TO_BE_FINITE}"
+            return AssemblyError(text, [self.labels[i] for i in lost], code="EG-NOT-FINITE")
+        kept, spare = self._needed(q)
+        if spare:
+            try:
+                q = functions.close(wanted, guess, system=functions.with_rows(kept)).q
+            except AssemblyError:
+                pass
+            else:
+                return self._contradiction(spare, q, 0.0)
+        if wanted:
+            try:
+                functions.close({}, {**guess, **wanted})
+            except AssemblyError:
+                pass
+            else:
+                text = f"{error}; at t = 0 the drivers prescribe {', '.join(drivers.values())} too"
+                return AssemblyError(text, error.rows, code="EG-CONTRADICTION")
+        C = functions.position(q)[0]
+        gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {self._unit(i)}" for i in drivers]
+        text = str(error).partition("; check")[0]
         message = (
-            f"the mechanism is over-driven: it has {freedoms} degree{'s' if freedoms != 1 else ''} of freedom and "
-            f"{len(drivers)} driver{'s' if len(drivers) != 1 else ''}; {who}, and {drivers[row]} is off by {gap}"
+            f"the loops cannot reach the position that the drivers prescribe at t = 0: {text}; at the position nearest "
+            f"to the guess where the loops close, the drivers are off ({', '.join(gaps)}); give the drivers values "
+            "within reach, or a guess nearer to them"
         )
-        remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
-        problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy, "EG-CONTRADICTION"))
-    return ModelError(problems)
+        return AssemblyError(message, [*(self.labels[i] for i in drivers), *error.rows], code="EG-CONTRADICTION")
 
+    def _refuse_contradictions(self, q: Array) -> None:
+        """Follow the drivers that count; those left over must agree with them."""
+        kept, spare = self._needed(q)
+        if not spare:
+            return
+        for t, here in self._follow(self.functions.with_rows(kept), q):
+            if len(self._needed(here, t)[0]) > len(kept):
+                break  # the first position was singular; elsewhere all of them count
+            C = self.functions.scales.residual(self.functions.position(here, t)[0])
+            if np.abs(C[spare]).max() > CONTRADICTION:
+                raise self._contradiction(spare, here, t)
 
-def _felt(functions: ConstraintFunctions, drivers: Mapping[int, str], row: int, q: Array) -> bool:
-    """Whether a motion that the loops allow changes what a driver prescribes: here, or beside a dead centre."""
-    loops = _others(functions, list(drivers))
-    free = functions.with_rows(loops)
-    random = np.random.default_rng(1)
-    for moved in (0.0, 0.1, 0.3, 0.3):
-        step = moved * random.uniform(-1.0, 1.0, functions.scales.q.size)
-        try:
-            start = _guess(functions, functions.scales.move(q, step))
-            here = functions.close({}, start, restarts=0, system=free).q if moved else q
-        except AssemblyError:
-            continue
-        J = functions.scaled_jacobian(here)
-        if rank(J[[*loops, row]]).rank > rank(J[loops]).rank:
-            return True
-    return False
+    def _contradiction(self, spare: Sequence[int], q: Array, t: float) -> ModelError:
+        drivers, C, problems = self.names, self.functions.position(q, t)[0], []
+        others = [name for row, name in drivers.items() if row not in spare]
+        freedoms = len(others)
+        for row in spare:
+            place, gap = f"constraints.{drivers[row]}", f"{abs(C[row]):.3g} {self._unit(row)} at t = {t:.4g} s"
+            if not self._moves(row, q):
+                message = (
+                    "the driver has no effect: no motion of the mechanism changes the quantity that it prescribes, "
+                    f"and this is off by {gap}"
+                )
+                remedy = "drive a coordinate, or two markers that move relative to each other"
+                problems.append(self.kinematics.mechanism.problem(place, message, remedy, "EG-REDUNDANT"))
+                continue
+            verb = "moves" if freedoms == 1 else "move"
+            who = f"{' and '.join(others)} {verb} it already" if others else "the mechanism cannot move"
+            message = (
+                f"the mechanism is over-driven: it has {freedoms} degree{'s' if freedoms != 1 else ''} of freedom and "
+                f"{len(drivers)} driver{'s' if len(drivers) != 1 else ''}; {who}, and {drivers[row]} is off by {gap}"
+            )
+            remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
+            problems.append(self.kinematics.mechanism.problem(place, message, remedy, "EG-CONTRADICTION"))
+        return ModelError(problems)
 
+    def _moves(self, row: int, q: Array) -> bool:
+        """Whether a motion that the loops allow changes what a driver prescribes: here, or beside a dead centre."""
+        functions, hinted = self.functions, {name for name, _ in self.kinematics.hints}
+        free, random = functions.with_rows(self.others), np.random.default_rng(1)
+        for size in (0.0, 0.1, 0.3, 0.3):
+            start = functions.scales.move(q, size * random.uniform(-1.0, 1.0, functions.scales.q.size))
+            named = zip(self.kinematics.names, map(float, start), strict=True)
+            guess = {name: x for name, x in named if name not in hinted}
+            try:
+                here = functions.close({}, guess, restarts=0, system=free).q if size else q
+            except AssemblyError:
+                continue
+            J = functions.scaled_jacobian(here)
+            if rank(J[[*self.others, row]]).rank > rank(J[self.others]).rank:
+                return True
+        return False
 
-def _unit(functions: ConstraintFunctions, row: int) -> str:
-    return "m" if functions.kinematics.constraints.kinds[row] == "length" else "rad"
+    def _unit(self, row: int) -> str:
+        return "m" if self.kinematics.constraints.kinds[row] == "length" else "rad"
 
 
 PROBES = 4  #: further assembled configurations at which the rank is judged
@@ -378,7 +339,7 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     mechanism = kinematics.mechanism
     wanted, places = _wanted(kinematics, tuple(independent) or mechanism.independent)
     _check_names(kinematics, wanted)
-    values = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
+    values = mechanism.declared
     missing = [n for n, x in values.items() if x is None]
     numbers = {n: float(x) if x is not None else 1.0 + 0.1 * missing.index(n) for n, x in values.items()}
     functions = ConstraintFunctions(kinematics, numbers)
@@ -388,9 +349,10 @@ def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mo
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
     positions = {n: x for n, x in raw.items() if n in known}
-    result = close_driven(functions, positions, guess)
+    drivers = Drivers(functions)
+    result = drivers.assemble(positions, guess)
     require_finite(functions, result.q)
-    later = follow_drivers(functions, result.q)
+    later = drivers.later(result.q)
     judged = _partition(functions, [result.q, *_probe(functions, result.q), *later], wanted)
     _check_places(functions, result.q, places)
     rough = {name: value for name, value in guess.items() if name in known and name not in positions}

@@ -52,12 +52,10 @@ def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str,
     single = [j.coordinates[0] for j in joints]  # those that the user named first, as words for a branch
     if mobility.assumed or not kinematics.constraints.labels or not single:
         return []
-    numbers = {p.name: float(p.value or 0.0) for p in mechanism.parameters}
-    numbers |= {u.name: float(u.value or 0.0) for u in mechanism.inputs}
-    functions = ConstraintFunctions(kinematics, numbers)
+    functions = ConstraintFunctions.at_declared(kinematics)
     system, here = functions.system, np.array(mobility.q_reference)
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
-    initial = {name: x for name, x in initial_values(kinematics, numbers).items() if name in known}
+    initial = {name: x for name, x in initial_values(kinematics, functions.values).items() if name in known}
     kinds = dict(zip(kinematics.names, kinematics.kinds, strict=True))
     guessed = [name for name in mechanism.defaults.guess if name in known and kinds.get(name) != "parameter"]
     held = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
@@ -160,10 +158,9 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
 
 def _in_degrees(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     """Angles that start after more than two turns, as degrees would."""
-    m = kinematics.mechanism
-    numbers = {p.name: p.value for p in m.parameters} | {u.name: u.value for u in m.inputs}
     if mobility.assumed:
         return []
+    numbers = kinematics.mechanism.declared
     starts = initial_values(kinematics, numbers, "guess") | initial_values(kinematics, numbers)
     names = (*kinematics.names, *kinematics.loop_coordinates.names)
     kinds = dict(zip(names, (*kinematics.kinds, *kinematics.loop_coordinates.kinds), strict=True))

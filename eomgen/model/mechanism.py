@@ -304,6 +304,11 @@ class Mechanism:
     presentation: Presentation = Presentation()
 
     @property
+    def declared(self) -> dict[str, float | None]:
+        """Values of parameters and inputs by name; None of a parameter without one."""
+        return {p.name: p.value for p in self.parameters} | {u.name: u.value for u in self.inputs}
+
+    @property
     def sampled_names(self) -> set[str]:
         """States that clocks alone change, and the counters of the clocks."""
         return {name for clock in self.clocks for name in (*clock.states, clock.counter)}

@@ -41,8 +41,7 @@ class IdleMotion:
         v = self.v / np.abs(self.v).max()
         involved = [j for j in np.argsort(-np.abs(v), kind="stable") if abs(v[j]) > FAINT]
         largest = names[involved[0]]
-        spec = next((s for s in mechanism.joints if largest in (*s.coordinates, *s.velocities)), None)
-        path = f"joints.{spec.name}" if spec else f"{mechanism.bare_section}.{largest}"
+        path = _place_of_velocity(mechanism, largest)
         shown = sorted(involved)
         ratio = " : ".join(f"{v[j]:.3g}" for j in shown)
         together = f"{', '.join(names[j] for j in shown)} at the rates {ratio}"
@@ -71,6 +70,12 @@ class IdleMotion:
             result.append((body.name, moving[3:].reshape(3, 3).T @ (moving[:3] - still[:3])))  # drivers turn bodies too
         largest = max((float(np.linalg.norm(w)) for _, w in result), default=0.0)
         return [(name, clean(w)) for name, w in result if np.linalg.norm(w) > max(FAINT * largest, UNMOVED)]
+
+
+def _place_of_velocity(mechanism: Mechanism, label: str) -> str:
+    """The path of the joint of a velocity, or of the velocity itself where there are no joints."""
+    spec = next((s for s in mechanism.joints if label in (*s.coordinates, *s.velocities)), None)
+    return f"joints.{spec.name}" if spec else f"{mechanism.bare_section}.{label}"
 
 
 def clean(axis: np.ndarray) -> list[float]:
@@ -132,9 +137,8 @@ def find_massless(kinematics: Kinematics, mobility: Mobility, tree: TreeEquation
     small mechanism beside a large one is as sound as alone.
     """
     m, names = kinematics.mechanism, kinematics.velocity_labels
-    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
-    functions = ConstraintFunctions(kinematics, numbers)
-    n, r = len(names), mobility.rank
+    functions = ConstraintFunctions.at_declared(kinematics)
+    numbers, n, r = functions.values, len(names), mobility.rank
     if n == r:
         return []
     result = tree.pivots or (tree.constrained().pivots if tree.constrained is not None and functions.m else ())
@@ -179,8 +183,7 @@ def find_massless(kinematics: Kinematics, mobility: Mobility, tree: TreeEquation
     problems = []
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():
-            spec = next((s for s in m.joints if names[j] in (*s.coordinates, *s.velocities)), None)
-            path = f"joints.{spec.name}" if spec else f"{m.bare_section}.{names[j]}"
+            path = _place_of_velocity(m, names[j])
             what = "negative inertia" if size < -LEAST else "no inertia"
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along this coordinate moves no mass"
             problems.append(m.problem(path, message, REMEDY, "EG-NO-INERTIA"))
@@ -241,9 +244,8 @@ def smallest_share(kinematics: Kinematics, mobility: Mobility, tree: TreeEquatio
     n, r = len(names), mobility.rank
     if n == r or m.negative:
         return 1.0
-    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
     best = 0.0
-    for _, M, B in _inertia_at_samples(ConstraintFunctions(kinematics, numbers), mobility, tree):
+    for _, M, B in _inertia_at_samples(ConstraintFunctions.at_declared(kinematics), mobility, tree):
         root = np.sqrt(np.maximum((B**2 * np.abs(M.diagonal())[:, None]).sum(axis=0), TINY))
         best = max(best, float(algebra.eigvalsh((B.T @ M @ B) / np.outer(root, root))[0]))
         if best >= WORTH_A_WORD:
