@@ -10,12 +10,9 @@ Twist = tuple[Vec3, Vec3]  # angular, linear: a velocity or an acceleration, or 
 Wrench = tuple[Vec3, Vec3]  # moment about the origin, force
 
 
-def add(*terms: Twist) -> Twist:
-    """The sum of twists or wrenches."""
-    total = terms[0]
-    for term in terms[1:]:
-        total = vec.add(total[0], term[0]), vec.add(total[1], term[1])
-    return total
+def add(a: Twist, b: Twist) -> Twist:
+    """a + b"""
+    return vec.add(a[0], b[0]), vec.add(a[1], b[1])
 
 
 def sub(a: Twist, b: Twist) -> Twist:

@@ -199,7 +199,7 @@ def _loop_coordinates(
     state: MotionSymbols,
 ) -> LoopCoordinates:
     names, kinds, values = measured
-    along = {symbol: rate for symbol, rate in state.along.items() if symbol not in state.clock}
+    along = {symbol: rate for symbol, rate in state.along.items() if symbol not in state.time_direction}
     rates = jvp(values, along)
     entries = state.slopes(values, rates)
     zero = graph.zero
@@ -224,7 +224,7 @@ def _resolve_force(force: Force, motion: MarkerMotion, mechanism: Mechanism) -> 
     loads, rest = ([with_entries(load, values) for load in part] for part in (loads, rest))
     if potential is not None:
         potential = substitute([potential], mapping)[0] if mapping else potential
-        allowed = {p.name for p in mechanism.parameters} | {n for n, _ in _coordinate_symbols(motion)}
+        allowed = {p.name for p in mechanism.parameters} | motion.coordinates.keys()
         if not symbols_of([potential]) <= allowed:
             potential = None
     return ForceTerms(force, *_sorted(loads), potential, *_sorted(loads if potential is None else rest))
@@ -286,17 +286,13 @@ def _names_in(element: object) -> set[str]:
     return symbols_of([part for part in parts_of(element) if isinstance(part, Expr)])
 
 
-def _coordinate_symbols(motion: MarkerMotion) -> list[tuple[str, Expr]]:
-    return [(name, triple[0]) for name, triple in motion.coordinates.items()]
-
-
 # -- joint rates -------------------------------------------------------------------------------------------------------
 
 
 def joint_rates(kinematics: Kinematics) -> list[JointRates]:
     """The rates of every link, in tree order."""
     graph, links, v = kinematics.graph, kinematics.links, kinematics.v
-    along: Mapping[Expr, Expr] = kinematics.flow | kinematics.clock
+    along: Mapping[Expr, Expr] = kinematics.q_dot_direction | kinematics.time_direction
     columns = [x for link in links for angular, _ in link.columns for x in angular]
     flows = jvp([*columns, *(x for link in links for x in link.position)], along)
     slides = flows[len(columns) :]

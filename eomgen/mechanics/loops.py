@@ -160,7 +160,7 @@ def differentiate_constraints(
     values = [r.expression for r in kept if r.level == "position"]
     nonholonomic = [r.expression for r in kept if r.level != "position"]
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
-    along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
+    along = state.q_dot_direction | state.time_direction
     velocity = jvp(values, along)
     if state.general_rates:  # q' may keep a constraint by itself, as that of Euler parameters keeps their norm
         kept_by_rates = zip(velocity, kept, vanishes(velocity), strict=False)
@@ -178,7 +178,7 @@ def differentiate_constraints(
         written=tuple(r.written for r in kept),
         values=tuple(values),
         jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
-        time_derivative=(*jvp(values, {**state.clock, **dict(still)}), *substitute(nonholonomic, at_rest)),
+        time_derivative=(*jvp(values, {**state.time_direction, **dict(still)}), *substitute(nonholonomic, at_rest)),
         velocity=(*velocity, *nonholonomic),
         gamma=tuple(jvp([*velocity, *nonholonomic], along | at_rest)),
         slopes=tuple(tuple(slopes.get((i, j), zero) for j in range(len(state.q))) for i in range(m)) if slopes else (),

@@ -232,18 +232,18 @@ class MotionSymbols:
     a: tuple[Expr, ...]
     t: Expr
     rates: tuple[Expr, ...]
-    clock: dict[Expr, Expr]  #: t' = 1, and the rates of the inputs, as the direction of a derivative
+    time_direction: dict[Expr, Expr]  #: t' = 1, and the rates of the inputs, as the direction of a derivative
     general_rates: bool  #: whether q' = N(q, t) v + b(q, t) of given equations, beyond q' = v
 
     @property
-    def flow(self) -> dict[Expr, Expr]:
+    def q_dot_direction(self) -> dict[Expr, Expr]:
         """The rates of the coordinates, q' = N(q) v, as the direction of a derivative."""
         return dict(zip(self.q, self.rates, strict=True))
 
     @cached_property
     def along(self) -> dict[Expr, Expr]:
         """The direction of d/dt: q' = N v, v' = a, t' = 1, and the rates of the inputs."""
-        return {**self.flow, **dict(zip(self.v, self.a, strict=True)), **self.clock}
+        return {**self.q_dot_direction, **dict(zip(self.v, self.a, strict=True)), **self.time_direction}
 
     def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
         """d/dt along q' = N v, v' = a, t' = 1, and the rates of the inputs."""
@@ -308,7 +308,7 @@ def motion_symbols(mechanism: Mechanism, topology: Topology) -> MotionSymbols:
         a=tuple(graph.symbol(acceleration_name(n)) for n in velocity_names),
         t=graph.symbol("t"),
         rates=rates,
-        clock=clock(graph, mechanism.inputs),
+        time_direction=clock(graph, mechanism.inputs),
         general_rates=equations is not None and rates != v,
     )
 

@@ -236,10 +236,6 @@ class JointWrenches:
         motion = self.kinematics.motion
         return [motion.position(motion.body(k)) for k in range(len(self.mechanism.bodies))]
 
-    def _at_body(self, body: int, point: Vec3, wrench: Row6) -> Row6:
-        """A wrench about a point, about the origin of a body instead."""
-        return _about(wrench, point, self.origins[body])
-
     @cached_property
     def cut(self) -> list[CutJoint]:
         """Gradients of the equations and coordinates of cut joints."""
@@ -269,7 +265,7 @@ class JointWrenches:
         """A wrench on S about S, and its opposite on P, about the origins of the two bodies."""
         point = self.kinematics.poses.marker(spec.successor).position
         first, second = spec.predecessor.body, spec.successor.body
-        result = {body: self._at_body(body, point, gradient) for body in (second, first) if body != GROUND}
+        result = {body: _about(gradient, point, self.origins[body]) for body in (second, first) if body != GROUND}
         return {body: tuple(-x for x in six) if body == first else six for body, six in result.items()}
 
     # -- the kernels ----------------------------------------------------------------------------------------------
@@ -389,12 +385,12 @@ class JointWrenches:
             gravity = self.mechanism.gravity
             force = vec.sub(force, vec.scale(link.spatial.mass, gravity))
             moment = vec.sub(moment, vec.cross(vec.times(frame.rotation, link.spatial.moment), gravity))
-            total.append(list(self._at_body(b, frame.position, (*force, *moment))))
+            total.append(list(_about((*force, *moment), frame.position, self.origins[b])))
         for terms in kinematics.forces:
             for load in terms.marker_loads:
                 if load.marker.body != GROUND:
-                    point = poses.marker(load.marker).position
-                    _take(total, load.marker.body, self._at_body(load.marker.body, point, (*load.force, *load.torque)))
+                    point, body = poses.marker(load.marker).position, load.marker.body
+                    _take(total, body, _about((*load.force, *load.torque), point, self.origins[body]))
         through = [[kinematics.graph.zero] * 6 for _ in self.cut]
         for name, value in self.loads_on_cut():
             k, gradient = next((k, g) for k, joint in enumerate(self.cut) for n, g in joint.coordinates if n == name)
@@ -596,7 +592,7 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
             "lists": listed,
             "moved_by": [last[body] for force in forces for body in force.met_bodies],
             "parents": list(kinematics.parent),
-            "bodies": [_name(kinematics, body) for force in forces for body in force.met_bodies],
+            "bodies": [kinematics.motion.body(body).label for force in forces for body in force.met_bodies],
         },
         **({"rigid_by_motion": moving} if (moving := _by_motion(kinematics, forces)) else {}),
         **({"rigid_only": rigid} if (rigid := [force.name for force in forces if force.is_rigid]) else {}),
@@ -608,7 +604,3 @@ def _by_motion(kinematics: Kinematics, forces: Sequence[Force]) -> dict[str, lis
     moving = (*kinematics.velocity_names, *kinematics.state_names)
     used = {force.name: symbols_of(kinematics.resolve(list(force.near(kinematics.motion)))) for force in forces}
     return {name: result for name, of in used.items() if (result := [one for one in moving if one in of])}
-
-
-def _name(kinematics: Kinematics, body: int) -> str:
-    return "ground" if body == GROUND else kinematics.mechanism.bodies[body].name

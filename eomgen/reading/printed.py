@@ -596,7 +596,7 @@ class PrintedParts:
 
     # -- named parts --------------------------------------------------------------------------------------------------
     @cached_property
-    def _found(self) -> dict[PartMeaning, list[tuple[Any, Any]]]:
+    def _by_meaning(self) -> dict[PartMeaning, list[tuple[Any, Any]]]:
         """Named parts by meaning."""
         k = self._kinematics
         outputs = {matrix.meaning: list(matrix.values) for matrix in self._matrices}
@@ -606,12 +606,12 @@ class PrintedParts:
     @cached_property
     def _meaning(self) -> dict[str, PartMeaning]:
         """What each named part is."""
-        return {str(name): meaning for meaning, parts in self._found.items() for name, _ in parts}
+        return {str(name): meaning for meaning, parts in self._by_meaning.items() for name, _ in parts}
 
     def _groups(self) -> Iterator[Folded]:
         matrices = {matrix.meaning: matrix for matrix in self._matrices}
         for meaning, title in TITLES.items():
-            parts = self._found.get(meaning, ())
+            parts = self._by_meaning.get(meaning, ())
             lines = [FormulaLine((Name(str(name)), self.printed.formula(x))) for name, x in parts]
             operations = sum(operations_of(x) for _, x in parts)
             if matrix := matrices.get(meaning):

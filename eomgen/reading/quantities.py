@@ -85,7 +85,7 @@ def without_forces(kinematics: Kinematics) -> Kinematics:
         still = tuple(graph.zero for _ in bare.forces)
         moving = bare.expression + equations.potential_energy
         equations = differentiate(
-            graph, replace(bare, expression=moving, forces=still, dissipation=graph.zero), kinematics.clock
+            graph, replace(bare, expression=moving, forces=still, dissipation=graph.zero), kinematics.time_direction
         )
     forced = replace(mechanism, gravity=vec.zero(graph), forces=(), given=equations)
     return replace(kinematics, mechanism=forced, forces=())

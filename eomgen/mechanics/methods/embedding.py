@@ -296,7 +296,7 @@ class ForceSlopes:
         if self._places[index] < 0:
             above, still = self._above(k), vec.zero(kinematics.graph)
             return MotionField(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
-        x = jvp([*s, *l], kinematics.flow)
+        x = jvp([*s, *l], kinematics.q_dot_direction)
         own, moved = (x[0], x[1], x[2]), (x[3], x[4], x[5])
         two = kinematics.graph.constant(2.0)
         return MotionField(
@@ -381,7 +381,7 @@ class ForceSlopes:
     def _swept(self, a: Sequence[Expr], motions: list[tuple[Vec3, Mat3, Vec3]]) -> list[list[Twist]]:
         """Per column the second derivative of its field as seen from ground, less s x (acceleration of the origin)."""
         kinematics, two = self._kinematics, self._kinematics.graph.constant(2.0)
-        along = kinematics.flow | dict(zip(kinematics.v, a, strict=True))
+        along = kinematics.q_dot_direction | dict(zip(kinematics.v, a, strict=True))
         result: list[list[Twist]] = []
         for k, link in enumerate(kinematics.links):
             _, turning, linear = motions[k]
@@ -392,7 +392,7 @@ class ForceSlopes:
                     fixed = _turning(self._above(k), link.down(alpha))
                     result[k].append((vec.times(fixed, s), vec.neg(vec.cross(s, linear))))
                     continue
-                first = jvp([*s, *l], kinematics.flow)
+                first = jvp([*s, *l], kinematics.q_dot_direction)
                 second = jvp(first, along)
                 rates = [vec.cross(self._omegas[k], vec.three(first, at)) for at in (0, 3)]
                 own = [vec.add(vec.three(second, 3 * m), vec.scale(two, rates[m])) for m in (0, 1)]

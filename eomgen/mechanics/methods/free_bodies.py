@@ -70,7 +70,7 @@ class FreeBodies:
     def _products(self) -> list[Twist]:
         kinematics = self.kinematics
         columns = [x for link in kinematics.links for column in link.columns for part in column for x in part]
-        flows = jvp(columns, kinematics.flow | kinematics.clock)
+        flows = jvp(columns, kinematics.q_dot_direction | kinematics.time_direction)
         result: list[Twist] = []
         at = 0
         for link, twist in zip(kinematics.links, kinematics.twists, strict=True):

@@ -9,7 +9,7 @@ of their velocities, S has one reverse gradient, and M is its Hessian: no recurs
 
 from __future__ import annotations
 
-from ...elements.forces import CoordinateLoad, MarkerLoad
+from ...elements.forces import Load
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import gradient, hessian
@@ -22,7 +22,7 @@ from .tree_equations import TreeEquations
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Gibbs-Appell equations of the spanning tree."""
     slopes = gradient(energy_of_acceleration(kinematics), list(kinematics.a))
-    loads: list[MarkerLoad | CoordinateLoad] = []
+    loads: list[Load] = []
     for terms in kinematics.forces:
         loads += [*terms.marker_loads, *terms.coordinate_loads]
     inverse = [s - f for s, f in zip(slopes, virtual_power(kinematics, loads), strict=True)]

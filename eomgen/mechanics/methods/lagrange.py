@@ -82,7 +82,10 @@ def momentum_equations(kinematics: Kinematics, method: str, kinetic: Expr, poten
         w, p, slope = (vec.three(x, j) for x in (v, momenta, slopes))
         slopes[j : j + 3] = vec.sub(slope, vec.cross(w, p))
     rates = [s + f for s, f in zip(slopes, generalized_forces(kinematics), strict=True)]
-    drift, total = jvp(momenta, kinematics.flow | kinematics.clock), kinematics.total_derivative(momenta)
+    drift, total = (
+        jvp(momenta, kinematics.q_dot_direction | kinematics.time_direction),
+        kinematics.total_derivative(momenta),
+    )
     return TreeEquations(
         method=method,
         mass=hessian(momenta, v),

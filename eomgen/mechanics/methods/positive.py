@@ -27,7 +27,7 @@ FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of 
 
 
 @dataclass(frozen=True)
-class IdleMotion:
+class MasslessMotion:
     """Velocities v (n,), in the order of the freedoms, that move no mass at a configuration q (n_q,)."""
 
     q: np.ndarray
@@ -152,7 +152,7 @@ def find_massless(kinematics: Kinematics, mobility: Mobility, tree: TreeEquation
                     sizes[j] = max(sizes[j], sizes[k])
             if safely_positive(pivots, sizes):
                 return []
-    worst: tuple[float, np.ndarray, IdleMotion | None] | None = None
+    worst: tuple[float, np.ndarray, MasslessMotion | None] | None = None
     for q, M, B in _inertia_at_samples(functions, mobility, tree):
         embedded = B.T @ M @ B
         sizes, modes = algebra.eigh(correlated(embedded))
@@ -168,7 +168,7 @@ def find_massless(kinematics: Kinematics, mobility: Mobility, tree: TreeEquation
             massless = None
             if not vanishing.size:
                 what = "negative inertia" if sizes[0] < -LEAST else "no inertia"
-                massless = IdleMotion(q, motion * functions.scales.q, what, numbers)
+                massless = MasslessMotion(q, motion * functions.scales.q, what, numbers)
             worst = float(sizes[0]), np.abs(motion), massless
     if worst is None:
         raise EvaluationError(

@@ -119,7 +119,7 @@ class Articulated:
                     mass[k - 3][m] = mass[m][k - 3] = coupling[m][k - 3] = zero
         return Articulated(symmetric(_matrix(inertia)), _matrix(coupling), symmetric(_matrix(mass)))
 
-    def held(self, wrench: Wrench, reciprocal: Expr) -> Articulated:
+    def constrained(self, wrench: Wrench, reciprocal: Expr) -> Articulated:
         """What is felt when a constraint that acts by the wrench holds: I + K K^T / G."""
         inertia, coupling, mass = self._with_square(wrench, reciprocal, operator.add)
         return Articulated(symmetric(_matrix(inertia)), _matrix(coupling), symmetric(_matrix(mass)))
@@ -356,7 +356,7 @@ class ArticulatedBodies:
             result.append(Multiplier(i, wrench, rest, reciprocal, others))
             self.row_pivots[i] = pivot
             if k is not None:
-                self.bodies[k] = self.bodies[k].held(wrench, reciprocal)
+                self.bodies[k] = self.bodies[k].constrained(wrench, reciprocal)
                 self.wrenches[k] = add(self.wrenches[k], scaled(rest * reciprocal, wrench))
             for j, entry in others.items():
                 share = entry * reciprocal
