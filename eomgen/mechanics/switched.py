@@ -14,12 +14,13 @@ from ..elements.forces import CoordinateLoad, MarkerLoad
 from ..elements.forces.force import Force, Load, View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
+from ..expr.differentiate import jacobian
 from ..expr.identity import vanishes
 from ..expr.records import dataclass
 from ..model.mechanism import Switched
 from .kinematics import ForceTerms, Kinematics
 from .loops import couple, differentiate_constraints, refuse_rows_of_time, refuse_unusable
-from .wrenches import JointWrenches, Row6, virtual_power
+from .wrenches import JointWrenches, Row6
 
 #: Operations whose results are numbers whatever numbers they are given.
 FINITE = {"sym", "const", "add", "sub", "mul", "neg", "sin", "cos", "abs", "min", "max", "lt", "le", "eq", "select"}
@@ -77,21 +78,11 @@ def _of_one(kinematics: Kinematics, switch: Switched) -> tuple[list[SwitchedRow]
             rest = result.gamma[i] + 2.0 * rate * speed + rate * rate * result.values[i]
         else:
             rest = result.gamma[i] + rate * speed
-        row = [_while_closed(switch, x) for x in (*J, speed, rest)]
+        *entries, C_rate, w = (_while_closed(switch, x) for x in (*J, speed, rest))
         value = result.values[i] if i < len(result.values) else graph.zero
         errors = (where(switch.holds, value, 0.0), where(switch.holds, speed, 0.0))
-        own = (
-            label,
-            switch.state,
-            switch.holds,
-            tuple(row[:-2]),
-            row[-2],
-            row[-1],
-            multiplier,
-            errors,
-            result.kinds[i],
-        )
-        rows.append(SwitchedRow(*own))
+        closed = label, switch.state, switch.holds, tuple(entries), C_rate, w
+        rows.append(SwitchedRow(*closed, multiplier, errors, result.kinds[i]))
         for body, D in on_bodies[label].items():
             markers.append(_load(kinematics, body, tuple(_while_closed(switch, d) for d in D), multiplier))
         for name, part in zip(kinematics.velocity_labels, _left(kinematics, J, on_bodies[label]), strict=True):
@@ -119,6 +110,13 @@ def _left(kinematics: Kinematics, J: Sequence[Expr], on_bodies: dict[int, Row6])
     """What of a row acts along coordinates of the tree, beyond the wrenches on bodies."""
     if not on_bodies:
         return list(J)
-    loads = [MarkerLoad(kinematics.motion.body(k), vec.three(D, 0), vec.three(D, 3)) for k, D in on_bodies.items()]
-    total = [x - y for x, y in zip(J, virtual_power(kinematics, loads), strict=True)]
-    return [kinematics.graph.zero if zero else x for x, zero in zip(total, vanishes(total), strict=True)]
+    graph, total = kinematics.graph, list(J)
+    for body, D in on_bodies.items():
+        marker = kinematics.motion.body(body)
+        v, w = kinematics.motion.velocity(marker), kinematics.motion.angular_velocity(marker)
+        slopes = jacobian([*v, *w], list(kinematics.v))
+        for j in range(len(total)):
+            column = [slopes.get((k, j), graph.zero) for k in range(6)]
+            work = vec.dot(vec.three(D, 0), vec.three(column, 0)) + vec.dot(vec.three(D, 3), vec.three(column, 3))
+            total[j] = total[j] - work
+    return [graph.zero if zero else x for x, zero in zip(total, vanishes(total), strict=True)]
