@@ -15,7 +15,7 @@ from ..expr.notation import dotted
 from ..reading import Quantities
 from ..reading.document import Piece, Section, Sentence
 from ..reading.quantities import needed
-from .author import Author, Shown
+from .author import Author, PrintedQuantity
 
 
 def energies(author: Author) -> Section | None:
@@ -152,14 +152,14 @@ def _newton_euler(author: Author) -> list[Piece]:
     for name in eqs.free_bodies:
         named, body = eqs.written("free_bodies", name)
         pieces.append(Sentence(f"`{name}`:"))
-        author.shown.append(Shown("free_bodies", name, [], []))
+        author.printed.append(PrintedQuantity("free_bodies", name, [], []))
         pieces += _equations(author, [*body.force, *body.moment], named)
     pieces.append(
         Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
     )
     for name in eqs.joint_forces:
         named, pairs = eqs.written("joint_forces", name)
-        author.shown.append(Shown("joint_forces", name, [], []))
+        author.printed.append(PrintedQuantity("joint_forces", name, [], []))
         pieces += _equations(author, pairs, named)
     return [*pieces, *_block(author)]
 

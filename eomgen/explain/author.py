@@ -36,7 +36,7 @@ LETTERS = {
 }
 
 
-class Shown(NamedTuple):
+class PrintedQuantity(NamedTuple):
     """A quantity that stands in the document: its name and part for readers, and its entries with their left sides."""
 
     name: str
@@ -59,7 +59,7 @@ class Author:
         self.mechanism = equations.kinematics.mechanism
         self.names: Notation = equations.notation
         self._formula = Formulas(order_of(equations), digits=ROUNDED)
-        self.shown: list[Shown] = []
+        self.printed: list[PrintedQuantity] = []
         self.formed: list[tuple[str, Sequence[Expr], Written]] = []
         self._explained: list[tuple[Any, Any]] = []
 
@@ -143,7 +143,7 @@ class Author:
             return [Sentence(f"${left}$ is left out: it has {size} terms and factors; {where} gives it as SymPy.")]
         self.names = self.names.with_names(str(symbol) for symbol, _ in named)
         entries = list(self._entries(left, value, symmetric))
-        self.shown.append(Shown(*key, named, entries))
+        self.printed.append(PrintedQuantity(*key, named, entries))
         result: list[Piece] = [self.line(s, x) for s, x in named if s not in explained]
         if not isinstance(value, sympy.MatrixBase) or (
             size <= WHOLE and value.cols <= COLUMNS and value.rows <= 2 * COLUMNS

@@ -143,7 +143,7 @@ def compare(author: Author, module: Any) -> Difference:
     """
     result: dict[str, Comparison] = {}
     equations = author.equations
-    shown = {(s.name, s.part) for s in author.shown if s.name} | {("mass_matrix", None), ("force", None)}
+    shown = {(s.name, s.part) for s in author.printed if s.name} | {("mass_matrix", None), ("force", None)}
     each = {row.name for row in equations.rows() if row.by_name}
     others = sorted((key for key in shown if key[0] not in COMPARED), key=str)
     moves = bool(equations.mobility.n_dof)

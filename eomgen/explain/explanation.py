@@ -171,7 +171,7 @@ def explain(equations: Any, level: str = "full") -> Explanation:
 
 
 def _folded(section: Section | None) -> Section | None:
-    """A section that a page shows when it is asked to."""
+    """A section that a page shows on request."""
     return section._replace(folded=True) if section is not None and section.level == 1 else section
 
 

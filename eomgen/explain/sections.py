@@ -495,7 +495,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
     ]
     lines: list[Piece] = []
     left_out = 0
-    for shown in author.shown:
+    for shown in author.printed:
         try:
             known = known_values(shown.named, numbers)
             result = []

@@ -438,7 +438,7 @@ def atan2(y: Expr, x: Expr) -> Expr:
 
 
 LEAVES = frozenset({"const", "sym"})
-MANY = 100  #: so many roots are those of a big model: what they are made of is asked for again and again
+MANY = 100  #: so many roots are those of a big model: what they are made of is looked up again and again
 KEPT = 12  #: answers kept
 
 

@@ -29,7 +29,7 @@ class Units:
         for link in kinematics.links:
             turning = link.inertia[0][0] + link.inertia[1][1] + link.inertia[2][2]
             mass = mass + link.mass + turning / (length * length)
-        # bodies without inertia are told from the solution, not from a division by zero
+        # bodies without inertia are recognized by the solution, not by a division by zero
         some = graph.make("lt", graph.zero.id, mass.id)
         mass = Expr(graph, graph.make("select", some, mass.id, graph.one.id))
         #: twice the kinetic energy

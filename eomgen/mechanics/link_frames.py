@@ -340,7 +340,7 @@ class SlidingTriple:
 
 @dataclass(frozen=True)
 class Turned:
-    """M w' + h = 0 in turned velocities; ``form`` derives (M, h) when they are first asked for."""
+    """M w' + h = 0 in turned velocities; ``form`` derives (M, h) when first used."""
 
     form: Callable[[], tuple[Rows, tuple[Expr, ...]]]
     blocks: tuple[SlidingTriple, ...]

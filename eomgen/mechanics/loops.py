@@ -376,8 +376,8 @@ def _number(mechanism: Mechanism, value: Expr) -> float | None:
 def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints, for_a_time: bool = False) -> None:
     """Refuse constraints in which no coordinate stands: none can hold them.
 
-    A wrong number in place of a coordinate is told by assembly, with its size; where nothing is assembled it is told
-    here: in equations of velocities, and in all that hold ``for_a_time``, also where parameters stand in them.
+    A wrong number in place of a coordinate is reported by assembly, with its size; where nothing is assembled, it is
+    reported here: in equations of velocities, and in all that hold ``for_a_time``, also where parameters stand in them.
     """
     problems, clock = [], {"t", *(u.name for u in mechanism.inputs)}
     m = len(constraints.values)

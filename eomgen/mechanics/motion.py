@@ -140,7 +140,7 @@ def entries_of(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
 
 
 class Momentum:
-    """The sums over all bodies of a tree, each made once when asked for."""
+    """The sums over all bodies of a tree, each formed once, when first used."""
 
     def __init__(self, poses: Poses, twists: Sequence[Twist]) -> None:
         self.graph, self.poses, self.links, self.twists = poses.graph, poses, poses.links, twists
@@ -266,7 +266,7 @@ class MarkerMotion:
         self.turning = turning or {}
         self.known_reactions: Mapping[str, Expr] = {}  # what symbols of reactions stand for, once that is solved for
         self._state_rates: dict[str, tuple[Expr, ...]] = {}
-        self._open: list[str] = []  # quantities of elements being resolved, each asked for by the one before
+        self._open: list[str] = []  # quantities of elements being resolved, each used by the one before
 
     def relative(self, start: Marker, end: Marker) -> Frame:
         """Placement of marker ``end`` in the axes of marker ``start``."""

@@ -45,7 +45,7 @@ def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str,
     """One coordinate of each such position, with its value there.
 
     The independent coordinates and those of the guess are held where they are.  Of a rotation by several angles, which
-    describe it twice, nothing is told: only joints of one degree of freedom count.
+    describe it twice, nothing is listed: only joints of one degree of freedom count.
     """
     mechanism = kinematics.mechanism
     joints = sorted((j for j in mechanism.joints if len(j.coordinates) == 1), key=lambda j: not j.named)

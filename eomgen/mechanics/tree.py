@@ -297,7 +297,7 @@ def ancestors(links: Sequence[Link], k: int) -> list[int]:
 
 
 class Poses:
-    """Placement of links and markers in ground axes or in an ancestor link, each made once when asked for."""
+    """Placement of links and markers in ground axes or in an ancestor link, each formed once, when first used."""
 
     def __init__(self, mechanism: Mechanism, links: tuple[Link, ...]) -> None:
         self.graph, self.names = mechanism.graph, [body.name for body in mechanism.bodies]

@@ -164,7 +164,7 @@ class _Displaced(Poses):
 
 
 class JointWrenches:
-    """The straight-line parts of joint reactions of a mechanism with bodies; each is formed when it is asked for."""
+    """The straight-line parts of joint reactions of a mechanism with bodies; each is formed when first used."""
 
     def __init__(self, kinematics: Kinematics) -> None:
         self.kinematics = kinematics

@@ -73,7 +73,7 @@ class DrawnPicture(NamedTuple):
 
 
 class Folded(NamedTuple):
-    """Pieces that a page shows when it is asked to; ``title`` is always seen."""
+    """Pieces that a page shows on request; ``title`` is always seen."""
 
     title: Text
     pieces: tuple[Piece, ...]
@@ -85,7 +85,7 @@ Piece = Sentence | FormulaLine | Row | Table | DrawnPicture | Folded
 class Section(NamedTuple):
     """A heading and what stands below it; sections of ``level`` 2 belong to the one of level 1 before.
 
-    A page shows what is ``folded``, with what belongs to it, when it is asked to.
+    A page shows what is ``folded``, with what belongs to it, on request.
     """
 
     title: str

@@ -45,7 +45,7 @@ class NamedSum(sympy.Matrix):  # type: ignore[misc]  # SymPy has no types
 
 
 class ByName(Mapping[str, Value], Generic[Value]):
-    """Quantities by name, each made when it is first asked for; ``plain`` gives ``left_rod`` of ``left.rod``."""
+    """Quantities by name, each made when first used; ``plain`` gives ``left_rod`` of ``left.rod``."""
 
     def __init__(
         self, what: str, names: Sequence[str], make: Callable[[str], Value], plain: Callable[[str], str]
@@ -76,7 +76,7 @@ class ByName(Mapping[str, Value], Generic[Value]):
 
 
 class PartMeaning(IntEnum):
-    """What a named part is, in the order in which parts are told."""
+    """What a named part is, in the order in which parts are listed."""
 
     CONSTANT = 0  #: of parameters alone
     TURN = 1  #: sine or cosine

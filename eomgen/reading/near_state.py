@@ -91,7 +91,7 @@ def _samples(quantities: Quantities, expressions: Sequence[Expr]) -> Iterator[An
 
 
 def here(at: Mapping[str, Any]) -> str:
-    """The state in words."""
+    """The state as text."""
     return f"at {', '.join(f'{name} = {value}' for name, value in at.items())}" if at else "at any state"
 
 

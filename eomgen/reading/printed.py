@@ -359,8 +359,8 @@ def plain(line: str) -> str:
 
 # -- parts of large equations ------------------------------------------------------------------------------------------
 
-# Matrices stand with their zeros, and letters for their long entries; what the letters and the named parts are is told
-# in groups of one meaning. Of a mechanism with loops these are the parts of M = B^T M_t B, which are shorter than M.
+# Matrices stand with their zeros, and letters for their long entries; letters and named parts are listed in groups of
+# one meaning. Of a mechanism with loops these are the parts of M = B^T M_t B, which are shorter than M.
 
 
 SHORT = 14  #: characters of an entry that stands in its matrix

@@ -215,7 +215,7 @@ class SpatialMotion(NamedTuple):
 
 
 class Quantities:
-    """Every quantity of one derivation, in a graph of its own, each formed when it is first asked for."""
+    """Every quantity of one derivation, in a graph of its own, each formed when first used."""
 
     def __init__(self, kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
         self.kinematics, self.mobility, self.tree = kinematics, mobility, tree

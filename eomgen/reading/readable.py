@@ -91,7 +91,7 @@ SHOWN = 8  #: names that a message lists
 
 
 class Quantity(cached_property[Made]):
-    """A row of the table: an attribute that ``make`` forms of the equations and its name when it is first asked for.
+    """A row of the table: an attribute that ``make`` forms of the equations and its name when first used.
 
     ``offered`` is of what equations a display names it among those to read next; ``by_name`` whether each body, marker
     or joint has one.
@@ -184,7 +184,7 @@ class FreeBody(NamedTuple):
 
 
 class Readable(ABC):
-    """The quantities of derived equations as SymPy expressions and matrices, each made when it is first asked for.
+    """The quantities of derived equations as SymPy expressions and matrices, each made when first used.
 
     Matrices of the size of the degrees of freedom belong to the velocities of ``independent``; those of the size of
     the tree to all velocities ``v``.  In open chains both are the same.

@@ -73,32 +73,32 @@ class Form:
         good = self._good_names(parameters, prefix, roots)
         waiting, known = dict(good.turns), set[int]()
 
-        def tell_turns() -> None:
-            """Those whose angles hold no other names than those that were told."""
+        def name_turns() -> None:
+            """Those whose angles hold no other names than those named before."""
             for atom in [a for a in waiting if self.expansion.atoms.names({((a, 1),): 1}) <= known]:
                 symbol = sympy.Symbol(waiting.pop(atom))
                 named.append((symbol, raising.turn(atom)))
                 raising.turns[atom] = symbol
 
-        tell_turns()
+        name_turns()
         raising.roots = {atom: (sympy.Symbol(name), n) for atom, (name, n) in good.roots.items()}
         counted: set[int] = set()
 
-        def tell_roots(poly: Poly) -> None:
-            inside = self.expansion.atoms.all_in(poly)  # what a choice holds needs its roots told before it too
+        def name_roots(poly: Poly) -> None:
+            inside = self.expansion.atoms.all_in(poly)  # what a choice holds needs its roots before it too
             for root in sorted(inside.intersection(raising.roots).difference(counted)):
                 counted.add(root)
                 named.append((raising.roots[root][0], raising.root(root)))
 
         for atom, poly in self.named:
-            tell_roots(poly)
+            name_roots(poly)
             name = self.expansion.atoms.table[atom].what
             raising.names[name] = sympy.Symbol(good.intermediates.get(name, name))
             named.append((raising.names[name], raising.expression(poly)))
             known.add(atom)
-            tell_turns()
+            name_turns()
         for poly in self.polys:
-            tell_roots(poly)
+            name_roots(poly)
         written = [in_one_fashion(raising.expression(p)) for p in self.polys]
         return [(name, in_one_fashion(x)) for name, x in named], written
 

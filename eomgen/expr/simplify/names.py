@@ -96,7 +96,7 @@ def _parted(expansion: Expansion, value: Poly) -> tuple[Poly, Poly]:
 
 
 def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, value: Poly) -> Poly | None:
-    """A polynomial with the value of a name in its place, None where that cannot be told."""
+    """A polynomial with the value of a name in its place, None where that is not known."""
     if not _can_replace(expansion.atoms, poly, atom, value):
         return None
     replaced = _replaced(expansion.atoms, poly, atom, value)
@@ -290,7 +290,7 @@ class SharedSums:
     def _sums(self) -> Counter[Frozen]:
         """Sums of the form and how often each is written."""
         result: Counter[Frozen] = Counter()
-        outputs = {freeze(poly): poly for poly in self.polys}  # one that comes twice, as M_12 and M_21, is told once
+        outputs = {freeze(poly): poly for poly in self.polys}  # one that comes twice, as M_12 and M_21, counts once
         for poly in (*(poly for _, poly in self.named), *outputs.values()):
             if len(poly) > 1:
                 result[freeze(poly)] += 1
@@ -359,7 +359,7 @@ class SharedSums:
         changed = [(a, self._replaced(p, one, name, new)) for a, p in others]
         same = (k for k, ((_, p), (_, old)) in enumerate(zip(changed, others, strict=True)) if p is not old)
         first = next(same, None) if place is None else min(next(same, place), place)
-        if first is None:  # what is asked for alone uses it: behind what it is made of
+        if first is None:  # outputs alone use it: behind what it is made of
             within = self.atoms.names(poly)
             first = max((k + 1 for k, (a, _) in enumerate(changed) if a in within), default=0)
         self.polys = [self._replaced(p, one, name, new) for p in self.polys]

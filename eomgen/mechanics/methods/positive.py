@@ -116,7 +116,7 @@ def is_kinematic(mechanism: Mechanism) -> bool:
 
 
 def _massless(kinematics: Kinematics) -> str:
-    """The bodies that have neither mass nor inertia, in words."""
+    """The bodies that have neither mass nor inertia, as text."""
     mechanism = kinematics.mechanism
     names = [
         body.name

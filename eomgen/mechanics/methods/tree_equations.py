@@ -110,7 +110,7 @@ class TreeEquations:
 
     @property
     def mass_matrix(self) -> Rows:
-        """M, row by row, formed when it is first asked for."""
+        """M, row by row, formed when first used."""
         if callable(self.mass):
             self.mass = self.mass()
         return self.mass
