@@ -158,9 +158,8 @@ def compare(author: Author, module: Any) -> Difference:
                 _note(result, f"poses[{part}]", _number(equations, "poses", part, values), pose.ravel(), 1.0)
         keys = {f"{name}[{part}]" if name in each else name: (name, part) for name, part in others}
         for what, key in keys.items():
-            one = equations.as_formed(*key)
-            formed, named = one.formed()
-            _compare_formed(result, what, formed, named, one.written, values)
+            own, formed, named = equations.as_formed(*key)
+            _compare_formed(result, what, formed, named, own, values)
         for what, expressions, own in author.formed:
             _compare_formed(result, what, expressions, (), own, values)
     return Difference({name: one.finding().worst for name, one in result.items()}, STATES)

@@ -197,6 +197,12 @@ class PrintedEquations:
         return [(self.formula(left), self.formula(right)) for left, right in pairs]
 
     @property
+    def titled_states(self) -> list[tuple[str, list[tuple[Formula, Formula]]]]:
+        """First-order states, then sampled ones, under their titles, where there are any."""
+        titled = (("first-order states", self.states), (SAMPLED, self.sampled))
+        return [(title, pairs) for title, pairs in titled if pairs]
+
+    @property
     def values(self) -> list[Formula]:
         """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
         return [
@@ -232,10 +238,9 @@ class PrintedEquations:
             yield Sentence(f"{STILL.capitalize()}.")
         else:
             yield from self._motion() if self.parts is None else self.parts.items()
-        for title, pairs in (("first-order states", self.states), (SAMPLED, self.sampled)):
-            if pairs:
-                yield Sentence(title)
-                yield from map(FormulaLine, pairs)
+        for title, pairs in self.titled_states:
+            yield Sentence(title)
+            yield from map(FormulaLine, pairs)
         if self.remark:
             yield Sentence(self.remark)
 

@@ -149,13 +149,6 @@ def _n_v(equations: Readable) -> int:
     return len(equations.kinematics.v)
 
 
-class WrittenQuantity(NamedTuple):
-    """A quantity in SymPy, entry by entry; ``formed`` gives it as the derivation formed it."""
-
-    written: Written
-    formed: Callable[[], tuple[list[Expr], Names]]
-
-
 def _equations(left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
     import sympy
 
@@ -278,9 +271,13 @@ class Readable(ABC):
 
         n = self.mobility.n_dof
         written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
-        named = self._named["force"] = self._named["mass_matrix"]
-        self._all["force"] = self._all["mass_matrix"]  # they are written together
-        return named, sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, 1, written[n * n :])
+        self._written["force"] = self._written["mass_matrix"]  # they are written together
+        self._forms["force"] = self._forms["mass_matrix"]
+        return (
+            self._written["force"].intermediates,
+            sympy.Matrix(n, n, written[: n * n]),
+            sympy.Matrix(n, 1, written[n * n :]),
+        )
 
     mass_matrix = Quantity(lambda eqs, _: eqs._motion[1], "sympy.Matrix (n, n), n the degrees of freedom.", ANY)
     force = Quantity(
@@ -554,13 +551,14 @@ class Readable(ABC):
             return [x for matrix in (result.A, result.B) for row in matrix for x in row]
 
         written = self._write("linearize", choose, "A_")
-        self._require_finite("linearize", [*written, *(x for _, x in self._named["linearize"])], here(values))
-        if not self._named["linearize"]:
+        named = self._written.pop("linearize").intermediates
+        self._require_finite("linearize", [*written, *(x for _, x in named)], here(values))
+        if not named:
             written = [over_one_denominator(x) for x in written]
         (names,), inputs = states, self.kinematics.input_names
         n = len(names)
         A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])
-        return SymbolicLinearization(A, B, names, inputs, self._named.pop("linearize"))
+        return SymbolicLinearization(A, B, names, inputs, named)
 
     # -- how quantities are formed and written -------------------------------------------------------------------------
     @classmethod
@@ -583,13 +581,13 @@ class Readable(ABC):
     _put_in: tuple[Mapping[str, Any], ...] = ()
 
     @cached_property
-    def _named(self) -> dict[str, list[tuple[Any, Any]]]:
-        """Intermediates of what was written, by quantity."""
+    def _written(self) -> dict[str, Written]:
+        """What was written, by quantity."""
         return {}
 
     @cached_property
-    def _all(self) -> dict[str, WrittenQuantity]:
-        """What was written, by quantity."""
+    def _forms(self) -> dict[str, Callable[[], tuple[list[Expr], Names]]]:
+        """What gives each of these as the derivation formed it, with what names in it stand for."""
         return {}
 
     def _matrix(self, name: str, choose: Callable[[Quantities], Sequence[Sequence[Expr]]], columns: int) -> Any:
@@ -610,8 +608,8 @@ class Readable(ABC):
         return ByName(what, names, make, self._plain)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what gives quantities as they were formed, which are functions here."""
-        return {name: value for name, value in vars(self).items() if name != "_all"}
+        """Without the functions that give quantities as they were formed."""
+        return {name: value for name, value in vars(self).items() if name != "_forms"}
 
     def _write(self, name: str, choose: Choose, prefix: str = "", choose_names: ChooseNames | None = None) -> list[Any]:
         """Expressions of the quantities in SymPy; their named parts are kept under the name.
@@ -624,8 +622,7 @@ class Readable(ABC):
         if self._put_in:
             values = [*written.expressions, *(x for _, x in written.intermediates)]
             self._require_finite(name, values, f"with {self._view}")
-        self._named[name] = written.intermediates
-        self._all[name] = WrittenQuantity(written, lambda: self._form(choose, choose_names))
+        self._written[name], self._forms[name] = written, partial(self._form, choose, choose_names)
         return written.expressions
 
     def in_sympy(
@@ -663,17 +660,18 @@ class Readable(ABC):
         count = len(expressions) - len(names)
         return expressions[:count], [(name, x) for (name, _), x in zip(names, expressions[count:], strict=True)]
 
-    def as_formed(self, name: str, part: str | None = None) -> WrittenQuantity:
-        """A quantity as it was written and, to compare with, as it was formed; keys are those of :meth:`written`.
+    def as_formed(self, name: str, part: str | None = None) -> tuple[Written, list[Expr], Names]:
+        """A quantity as it was written and, to compare with, as it was formed, with what names in that stand for.
 
         Parts that were written together, such as those of generalized forces, are in the whole.
         """
         value, key = getattr(self, name), f"{name}.{part}"
         if isinstance(value, Mapping) and part is not None:
             value[part]
-        if key not in self._all and name not in self._all:  # made before this went through pickle
+        if key not in self._forms and name not in self._forms:  # made before this went through pickle
             return self.again().as_formed(name, part)
-        return self._all[key if key in self._all else name]
+        key = key if key in self._forms else name
+        return self._written[key], *self._forms[key]()
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
@@ -762,13 +760,13 @@ class Readable(ABC):
                 there = ", ".join(map(repr, tuple(value)[:SHOWN])) or "there are none"
                 raise incomplete(f"{name!r} are written one by one; give the name of one as part: {there}")
             whole = value[part]
-            return self._named[f"{name}.{part if part in tuple(value) else self._plain(part)}"], whole
+            return self._written[f"{name}.{part if part in tuple(value) else self._plain(part)}"].intermediates, whole
         if part is None:
-            named = self._named[name]  # those of the mass matrix and the force are chosen together
+            named = self._written[name].intermediates  # those of the mass matrix and the force are chosen together
             return needed(named, value) if name in ("mass_matrix", "force") else named, value
         if not isinstance(value, NamedSum):
             raise at_odds(f"{name!r} has no parts; leave {part!r} out")
-        return needed(self._named[name], value[part]), value[part]
+        return needed(self._written[name].intermediates, value[part]), value[part]
 
     @property
     def _own(self) -> tuple[str, ...]:

@@ -13,7 +13,6 @@ from ..expr.printing.writers import TIGHT, latex, text
 from .document import Folded, FormulaLine, Look, Piece, Row, Sentence, Table, Text, html, tex_formula, written
 from .printed import (
     FOLDED,
-    SAMPLED,
     SHORT,
     STILL,
     PrintedEntry,
@@ -58,12 +57,9 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
             result += [rest, "or in a shell: eomgen derive MODEL --format text"]
         if remark := printed.remark:
             result += ["", *fold(remark, columns, "", "  ")]
-    if printed.states:
-        result += ["", "first-order states"]
-        result += [x for a, f in printed.states for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
-    if printed.sampled:
-        result += ["", SAMPLED]
-        result += [x for a, f in printed.sampled for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
+    for title, pairs in printed.titled_states:
+        result += ["", title]
+        result += [x for a, f in pairs for x in _wrapped(f"{printed.text(a)} = ", printed.text(f), columns)]
     result += ["", *fold(", ".join(f"eqs.{name}" for name in printed.attributes), columns, "read next: ", "  ")]
     return "\n".join(result)
 
