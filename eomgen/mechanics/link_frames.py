@@ -46,7 +46,7 @@ from .tree import JointRates, Link, SpatialInertia, link_twists, no_inertia
 MULTIPLIED, OF_CENTRE, EXCHANGED = 1.0, 0.5, 0.1
 
 
-class _Seen(NamedTuple):
+class _Directions(NamedTuple):
     """What becomes shorter in good axes: arms to joints as parts of their size, and axes of joints."""
 
     lengths: list[np.ndarray]
@@ -78,14 +78,14 @@ class AxisTurns:
         if branch.parent not in self._open and np.count_nonzero(np.abs(H[:, 2]) > ROUNDED) < 2:
             return None
         self._open.add(branch.body)
-        seen = _Seen([], [], [])
-        if not self._look(branch, np.eye(3), seen):
+        directions = _Directions([], [], [])
+        if not self._collect(branch, np.eye(3), directions):
             return None
         angles = {0.0}
-        for x, y in (tuple(v[:2].tolist()) for v in (*seen.lengths, *seen.centres, *seen.axes, *H)):
+        for x, y in (tuple(v[:2].tolist()) for v in (*directions.lengths, *directions.centres, *directions.axes, *H)):
             if math.hypot(x, y) > ROUNDED:
                 angles |= {math.remainder(math.atan2(y, x) + k * math.pi / 2, 2 * math.pi) for k in range(4)}
-        costs = {a: _cost(a, H, seen) for a in angles}
+        costs = {a: _cost(a, H, directions) for a in angles}
         best = min(angles, key=lambda a: (round(costs[a], 3), abs(a)))
         if costs[0.0] - costs[best] < MULTIPLIED / 2:
             return None
@@ -93,7 +93,7 @@ class AxisTurns:
         c, s = graph.constant(math.cos(best)), graph.constant(math.sin(best))
         return ((c, -s, graph.zero), (s, c, graph.zero), (graph.zero, graph.zero, graph.one))
 
-    def _look(self, branch: Branch, axes: np.ndarray, seen: _Seen) -> bool:
+    def _collect(self, branch: Branch, axes: np.ndarray, directions: _Directions) -> bool:
         """Note the arms and axes of a link, and those of links on hinges parallel to its own, in common axes.
 
         False where a symbol lengthens an arm along an axis, as it would stand in two. Other arms with symbols are left
@@ -103,18 +103,18 @@ class AxisTurns:
         origin = inner.frame.position
         if (F := numbers(inner.frame.rotation)) is None:
             return True
-        points = [(seen.centres, self.mechanism.bodies[branch.body].com)]
+        points = [(directions.centres, self.mechanism.bodies[branch.body].com)]
         for marker in self._others[branch.body]:
             if marker is not inner:
-                points.append((seen.lengths, marker.frame.position))
+                points.append((directions.lengths, marker.frame.position))
                 if (R := numbers(marker.frame.rotation)) is not None:
-                    seen.axes.append(axes @ F.T @ R[:, 2])
+                    directions.axes.append(axes @ F.T @ R[:, 2])
         for arms, point in points:
             if (ends := numbers([point, origin])) is not None:
                 if size := np.abs(ends).max(axis=1).sum():
                     arm = axes @ F.T @ (ends[0] - ends[1])
                     arms.append(np.where(np.abs(arm) <= ROUNDED * size, 0.0, arm / size))
-            elif arms is seen.lengths and any(
+            elif arms is directions.lengths and any(
                 np.count_nonzero(np.abs(axes @ F.T @ arm) > ROUNDED * size) == 1 for arm, size in _growth(origin, point)
             ):
                 return False
@@ -123,7 +123,7 @@ class AxisTurns:
             R = numbers(outer.frame.rotation)
             if R is None or abs((F.T @ R)[2, 2] - 1.0) > ROUNDED or not self._symmetric(child):
                 continue
-            if not self._look(child, axes @ F.T @ R, seen):
+            if not self._collect(child, axes @ F.T @ R, directions):
                 return False
         return True
 
@@ -185,17 +185,17 @@ def _growth(start: Vec3, end: Vec3) -> list[tuple[np.ndarray, float]]:
     return result
 
 
-def _cost(angle: float, H: np.ndarray, seen: _Seen) -> float:
+def _cost(angle: float, H: np.ndarray, directions: _Directions) -> float:
     """How many constants stay that are multiplied with."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     cost = 0.0
-    for weight, arms in ((MULTIPLIED, seen.lengths), (OF_CENTRE, seen.centres)):
+    for weight, arms in ((MULTIPLIED, directions.lengths), (OF_CENTRE, directions.centres)):
         cost += weight * sum(np.count_nonzero(np.abs(turn.T @ x) > ROUNDED) for x in arms)
     for i, row in enumerate(H @ turn):
         for j, x in enumerate(row):
             cost += _entry(x, i == j)
-    for x in seen.axes:
+    for x in directions.axes:
         cost += sum(_entry(y, i == 2) for i, y in enumerate(turn.T @ x))
     return cost
 

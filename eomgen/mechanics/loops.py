@@ -255,7 +255,7 @@ def _level(condition: Condition, value: Expr, motion: MarkerMotion) -> str:
 # there, but not how they change.
 
 
-_HELD = "a constraint that closes or opens can contain states that only events and samples change"
+_SWITCHED_STATES = "a constraint that closes or opens can contain states that only events and samples change"
 
 
 class _Written(NamedTuple):
@@ -276,45 +276,45 @@ def refuse_unusable(mechanism: Mechanism, motion: MarkerMotion, rows: Sequence[R
     for equation in mechanism.constraints:
         if isinstance(equation, Equation):
             row, named = by_name[equation.name], symbols_of([equation.expression])
-            own = _Written(equation, row, named, symbols_of([row.expression]), sorted(named & requested))
-            if result := _of_states(mechanism, own) or (own.elements and _of_laws(mechanism, motion, own)):
+            one = _Written(equation, row, named, symbols_of([row.expression]), sorted(named & requested))
+            if result := _of_states(mechanism, one) or (one.elements and _of_laws(mechanism, motion, one)):
                 problems.append(mechanism.problem(f"constraints.{equation.name}.equation", *result))
     if problems:
         raise ModelError(problems)
 
 
-def _of_states(mechanism: Mechanism, own: _Written) -> tuple[str, str, str] | None:
+def _of_states(mechanism: Mechanism, one: _Written) -> tuple[str, str, str] | None:
     """Message, remedy and code for a state whose rate would have to stand in the rate of the equation.
 
-    One that is held between events has none; it may stand in what closes for a time, where an error that jumps with it
-    dies away.
+    One that is constant between events has none; it may stand in what closes for a time, where an error that jumps with
+    it dies away.
     """
-    for_a_time = any(own.equation is switch.constraint for switch in mechanism.switched)
+    for_a_time = any(one.equation is switch.constraint for switch in mechanism.switched)
     for state in mechanism.states:
-        if state.name in own.used and not (for_a_time and state.rate.is_zero):
-            law = "" if state.name in own.named or not own.elements else f" in the law of {', '.join(own.elements)}"
+        if state.name in one.used and not (for_a_time and state.rate.is_zero):
+            law = "" if state.name in one.named or not one.elements else f" in the law of {', '.join(one.elements)}"
             why = "not states" if state.rate.is_zero else "not states that change continuously"
-            remedy = f"{ALLOWED}, {why}; {_HELD}"
+            remedy = f"{ALLOWED}, {why}; {_SWITCHED_STATES}"
             return f"the state {state.name!r}{law} cannot be used here", remedy, "EG-REFERENCE"
     return None
 
 
-def _of_laws(mechanism: Mechanism, motion: MarkerMotion, own: _Written) -> tuple[str, str, str] | None:
+def _of_laws(mechanism: Mechanism, motion: MarkerMotion, one: _Written) -> tuple[str, str, str] | None:
     """The same for what laws of force elements bring in."""
-    state, whose = motion.state, f"in the law of {', '.join(own.elements)}"
+    state, whose = motion.state, f"in the law of {', '.join(one.elements)}"
     inputs = {u.name for u in mechanism.inputs}
-    moving = sorted(name for name in own.used & inputs - own.named if rate_of(name) not in inputs)
+    moving = sorted(name for name in one.used & inputs - one.named if rate_of(name) not in inputs)
     if moving:
         remedy = "write the law out in the equation, so that its rates become inputs too"
         return f"the rate of the input {moving[0]!r} {whose} is needed here and not known", remedy, "EG-REFERENCE"
     known = inputs | {p.name for p in mechanism.parameters} | {s.name for s in mechanism.states}
     known |= {str(x.node[1]) for x in (*state.q, *state.v, state.t)}
-    unknown = sorted(own.used - known)
+    unknown = sorted(one.used - known)
     if unknown:
         remedy = f"{ALLOWED}, not accelerations and reactions"
         return f"{unknown[0]!r} {whose} cannot be used here", remedy, "EG-REFERENCE"
-    velocities = [v for v in state.v if v.node[1] in own.used]
-    if not symbols_of(gradient(own.row.expression, velocities)).isdisjoint({str(v.node[1]) for v in velocities}):
+    velocities = [v for v in state.v if v.node[1] in one.used]
+    if not symbols_of(gradient(one.row.expression, velocities)).isdisjoint({str(v.node[1]) for v in velocities}):
         message = f"the equation is not linear in the velocities {whose}"
         return message, "a nonholonomic constraint must be linear in the velocities", "EG-EXPRESSION"
     return None
