@@ -298,7 +298,7 @@ def element(
 
 # -- laws --------------------------------------------------------------------------------------------------------------
 class Law(Field):
-    """A mapping of the type of a law and its keys."""
+    """A mapping {type: ..., key: value, ...} of a law."""
 
     argument, annotation = "mapping", "Mapping[str, Any]"
 
