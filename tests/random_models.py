@@ -11,7 +11,9 @@ from typing import Any
 import judges
 import numpy as np
 import rotations
+from hypothesis import reject
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
@@ -479,6 +481,11 @@ class Made:
         able += [self.recipe.last + 1] if self.recipe.closing in ALLOWED else []
         return able[(able.index(self.recipe.cut) + self.clothes.cut) % len(able)]
 
+    @property
+    def loop(self) -> list[str]:
+        """Names of the joints from ground to the one that closes; of a tree too, without that one."""
+        return [*(self.name(f"q{k}") for k in range(self.recipe.last + 1)), self.name("close")]
+
     def kind(self, k: int) -> str:
         """The type of a joint of the loop."""
         return (*self.recipe.kinds[: self.recipe.last + 1], self.recipe.closing)[k]
@@ -642,7 +649,19 @@ class Made:
         x = module.x0()
         x[:n] += (0.05 if self.numbers.start else 0.6) * random.uniform(-1, 1, n)
         x[n : n + v] = random.uniform(-1, 1, v)
-        return np.asarray(module.project(x, t=TIME))
+        try:
+            return np.asarray(module.project(x, t=TIME))
+        except eg.ProjectionError:
+            if "driver" not in self.recipe.constraints or self.reaches(module):
+                raise
+            reject()
+
+    def reaches(self, module: Any) -> bool:
+        """Whether SciPy, from anywhere, brings the loop where its driver is at ``TIME``."""
+        random, tight = np.random.default_rng(self.recipe.seed), dict.fromkeys(("xtol", "ftol", "gtol"), 1e-15)
+        starts = random.uniform(-np.pi, np.pi, (50, module.n_q))
+        gaps = (least_squares(lambda q: module.constraints(q, t=TIME), q, **tight).fun for q in starts)
+        return any(np.abs(gap).max() <= 1e-9 for gap in gaps)
 
     def places(self, module: Any) -> tuple[np.ndarray, np.ndarray]:
         """Turns and places of the bodies where a run starts, as the bodies were made, in SI units."""
