@@ -178,18 +178,33 @@ class Equations(Derivation):
         return functions
 
     def write_fmu(self, path: str | Path | None = None, version: str = "2.0") -> Path:
-        """Write a functional mock-up unit for other simulators: see :func:`eomgen.codegen.targets.fmu.write_fmu`.
+        """Write a functional mock-up unit for other simulators, one file with its sources in C.
+
+        It has model exchange and co-simulation.  Its variables are coordinates and velocities, their derivatives
+        ``der(name)``, inputs, parameters (which can be set between steps), outputs and the values of events, with units
+        and texts.  Start values are those of the model's initial state.  Coordinates that loops make dependent follow
+        from the independent ones during initialization.
 
         Parameters
         ----------
         path : str or Path, optional
-            Of the file, by default ``<name>.fmu`` here.
+            Of the file, by default ``<name>.fmu`` here; a file of this name is replaced.
         version : {'2.0', '3.0'}, optional
             Of FMI.
 
         Returns
         -------
         Path
+
+        Raises
+        ------
+        ModelError
+            A parameter has no value, or the model has impacts: events with ``restitution``, or contacts with
+            law ``rigid``.
+        UsageError
+            An unknown version, or a file name that does not end in ``.fmu``.
+        ToolchainError
+            No compiler, or it failed.
 
         Examples
         --------

@@ -34,6 +34,9 @@ from .terms import SystemTerms
 
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
 SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
+#: What a program takes from the terms as it is.
+OF_TERMS = ("graph", "sizes", "preferred", "parent", "quaternion_slots", "general_rates", "coordinate_of", "system",
+            "projects", "n_states")  # fmt: skip
 
 
 def program_of(
@@ -100,32 +103,13 @@ def _build(terms: SystemTerms, metadata: dict[str, Any], kernels: Sequence[str] 
         operations={key: value.as_dict() for key, value in counts.items()},
     )
     _check_symbols(terms, blocks.values())
+    contacts = maker.contacts if COLUMNS[0] in blocks else None
+    made_of_terms = {name: getattr(terms, name) for name in OF_TERMS}
     return Program(
-        name=name,
-        metadata=info.to_dict(),
-        graph=terms.graph,
-        time=terms.t,
-        coordinates=terms.q,
-        velocities=terms.v,
-        parameters=terms.p,
-        inputs=terms.u,
-        sizes=sizes,
-        blocks=tuple(blocks.values()),
-        drivers=tuple(drivers),
-        hoisted=hoisted,
-        parameter_only=parameter_only,
-        preferred=terms.preferred,
-        parent=terms.parent,
-        quaternion_slots=terms.quaternion_slots,
-        general_rates=terms.general_rates,
-        coordinate_of=terms.coordinate_of,
-        counts=counts,
-        limits=limits,
-        system=terms.system,
-        projects=terms.projects,
-        n_states=terms.n_states,
-        contacts=maker.contacts if COLUMNS[0] in blocks else None,
-    )
+        name, info.to_dict(), blocks=tuple(blocks.values()), drivers=tuple(drivers), hoisted=hoisted,
+        parameter_only=parameter_only, counts=counts, limits=limits, contacts=contacts, time=terms.t,
+        coordinates=terms.q, velocities=terms.v, parameters=terms.p, inputs=terms.u, **made_of_terms,
+    )  # fmt: skip
 
 
 def _select(terms: SystemTerms, has_energy: bool, kernels: Sequence[str] | None) -> list[Kernel]:

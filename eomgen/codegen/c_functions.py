@@ -42,18 +42,19 @@ def each_name(function: str, orders: Sequence[int]) -> str:
     return f"each_{function}_{'_'.join(map(str, orders))}"
 
 
-def each_lane(function: str, operands: Iterable[str]) -> str:
-    """The loop that calls a function of doubles in every lane."""
-    lanes = ", ".join(f"EOMGEN_LANE({x}, k)" for x in operands)
-    return f"for (int k = 0; k < EOMGEN_WIDTH; k++) {{ EOMGEN_LANE(y, k) = {function}({lanes}); }}"
+def each_definition(name: str, arguments: Sequence[str], called: str) -> str:
+    """The function of this name that calls one of doubles in every lane."""
+    lanes = ", ".join(f"EOMGEN_LANE({x}, k)" for x in arguments)
+    return (
+        f"EOMGEN_SHARED inline real {name}({', '.join(f'real {x}' for x in arguments)})\n{{\n    real y = same(0.0);\n"
+        f"    for (int k = 0; k < EOMGEN_WIDTH; k++) {{ EOMGEN_LANE(y, k) = {called}({lanes}); }}\n    return y;\n}}\n"
+    )
 
 
 def _each(program: str, function: Function, orders: Sequence[int]) -> str:
     """Its definition."""
-    arity = range(function.arity)
-    head = f"EOMGEN_SHARED inline real {each_name(function.name, orders)}({', '.join(f'real x{k}' for k in arity)})"
-    loop = each_lane(c_name(program, function.name, orders), [f"x{k}" for k in arity])
-    return f"{head}\n{{\n    real y = same(0.0);\n    {loop}\n    return y;\n}}\n"
+    arguments = [f"x{k}" for k in range(function.arity)]
+    return each_definition(each_name(function.name, orders), arguments, c_name(program, function.name, orders))
 
 
 def _head(name: str, arity: int) -> str:

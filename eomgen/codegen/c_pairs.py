@@ -168,7 +168,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
             }
         )
     calls = {op: call for kind in function.kinds for op, call in kind.calls}
-    context = {
+    context = used._asdict() | {
         "name": program.name,
         "sum": function.name,
         "prefix": f"{program.name}_pairs_{function.name}",
@@ -196,10 +196,6 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
         "lined": any(table["lined"] for table in tables),
         "longest": max(table["length"] for table in tables),
         "apart": repr(APART),
-        "sums": used.sums,
-        "slopes": used.slopes,
-        "meets": used.meets,
-        "lists": used.lists,
         "witness": WITNESS,
         "record": RECORD,
         "room": function.room,

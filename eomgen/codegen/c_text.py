@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..base.operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..expr.core import Expr, Node, reachable
 from ..expr.texts import comment_text
-from .c_functions import each_lane, each_name
+from .c_functions import each_definition, each_name
 from .c_layout import places_again
 from .pair_sums import CopiedRun, PairLists, copied_runs
 from .program import Block, Program
@@ -313,14 +313,12 @@ def helper(row: Operation) -> str:
     """The definition that the C text of an operation needs, in every lane; empty where headers have it."""
     letters = "abc"[: row.arity]
     name = row.c.partition("(")[0]
-    head = f"EOMGEN_SHARED inline real {name}({', '.join(f'real {x}' for x in letters)})\n{{\n"
     if row.body:
-        return f"{head}    return {row.body};\n}}\n"
+        arguments = ", ".join(f"real {x}" for x in letters)
+        return f"EOMGEN_SHARED inline real {name}({arguments})\n{{\n    return {row.body};\n}}\n"
     if not name.startswith("each_"):
         return ""
-    if row.arity == 1:
-        return f"EOMGEN_EACH({name}, {row.name})\n"
-    return f"{head}    real y = same(0.0);\n    {each_lane(row.name, letters)}\n    return y;\n}}\n"
+    return f"EOMGEN_EACH({name}, {row.name})\n" if row.arity == 1 else each_definition(name, letters, row.name)
 
 
 def used_helpers(program: Program, roots: Sequence[Expr]) -> list[str]:

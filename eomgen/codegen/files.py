@@ -56,7 +56,7 @@ def environment() -> Environment:
 
 
 def own_file(directory: Path, name: str, ours: Callable[[Path], bool]) -> Path:
-    """The place of a file in a folder that is made, where there is none or one that eomgen wrote."""
+    """The place of a file in a folder that is made. Raises UsageError (there is one that eomgen did not write)."""
     where = directory / name
     if os.path.lexists(where) and not ours(where):
         raise bad_file(f"{where} exists and was not written by eomgen; move it, or choose another --out")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -251,12 +252,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **describe_start(kinematics),
         "length_scale": mobility.length_scale,
         "limits_told": m.defaults.limits_told,
-        "limits": {
-            name: dict(limits)
-            for j in m.joints
-            for name, limits in zip(j.coordinates, j.limits, strict=False)
-            if limits
-        },
+        "limits": {name: dict(of) for j in m.joints for name, of in zip(j.coordinates, j.limits, strict=False) if of},
         "system": _system(equations),
         "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
@@ -269,14 +265,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "contact_shapes": shapes,
         **(describe_contacts(kinematics) if shapes else {}),
         "picture": describe_picture(m),
-        "simulation": {
-            "end": m.defaults.simulation.end,
-            "method": m.defaults.simulation.method,
-            "rtol": m.defaults.simulation.rtol,
-            "atol": m.defaults.simulation.atol,
-            **({} if m.defaults.simulation.step is None else {"step": m.defaults.simulation.step}),
-            **_longest_step(kinematics),
-        },
+        "simulation": {k: x for k, x in asdict(m.defaults.simulation).items() if x is not None}
+        | _longest_step(kinematics),
     }
 
 

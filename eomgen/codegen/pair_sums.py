@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -47,9 +48,7 @@ def sums_again(program: Program) -> list[SumAgain]:
     """The sums of which the Jacobian takes derivatives along one direction after another at one place."""
     graph = program.graph
     roots = [y.id for block in program.blocks if block.name in BY_BODIES[1:] for y in block.outputs]
-    places: dict[str, set[int]] = {}
-    rated: dict[str, set[int]] = {}
-    read: dict[str, set[int]] = {}
+    places, rated, read = (defaultdict[str, set[int]](set) for _ in range(3))
     functions: dict[str, PairFunction] = {}
     for operation, first, *_ in (graph.nodes[i] for i in reachable(graph, roots) if graph.nodes[i][0] in graph.calls):
         call = pair_call(graph, operation)
@@ -58,15 +57,12 @@ def sums_again(program: Program) -> list[SumAgain]:
         name = call.function.name
         if call.part == "slope":
             functions[name] = call.function
-            places.setdefault(name, set()).add(first)
-            rated.setdefault(name, set()).update(call.numbers)
+            places[name].add(first)
+            rated[name].update(call.numbers)
         elif call.part == "item":
-            read.setdefault(name, set()).update(call.numbers)
-    return [
-        SumAgain(functions[name], frozenset(rated[name]), frozenset(read.get(name, ())))
-        for name in sorted(functions)
-        if len(places[name]) == 1
-    ]
+            read[name].update(call.numbers)
+    single = [name for name in sorted(functions) if len(places[name]) == 1]
+    return [SumAgain(functions[name], frozenset(rated[name]), frozenset(read[name])) for name in single]
 
 
 def refuse_sums(program: Program, target: str) -> None:

@@ -128,26 +128,19 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
         for seen in every
         if (result := _element(n, seen, owners)) is not None
     ]
-    gravity = n.numbers(mechanism.gravity) if n.known(mechanism.gravity) else [0.0, 0.0, 0.0]
     data = {
-        "gravity": gravity,
+        "gravity": n.numbers(mechanism.gravity) if n.known(mechanism.gravity) else [0.0, 0.0, 0.0],
         "bodies": [
             {
                 "com": n.numbers(b.com),
                 "mass": n.number(b.mass),
-                "inertia": [n.number(b.inertia[k][k]) for k in range(3)],
+                "inertia": n.numbers([row[k] for k, row in enumerate(b.inertia)]),
             }
             for b in mechanism.bodies
         ],
         "shapes": [
-            {
-                "body": s.body,
-                "kind": s.kind,
-                "sizes": n.numbers(s.sizes),
-                "file": s.file,
-                "color": s.color,
-                **n.frame(s.frame),
-            }
+            {"body": s.body, "kind": s.kind, "sizes": n.numbers(s.sizes), "file": s.file, "color": s.color}
+            | n.frame(s.frame)
             for s in mechanism.presentation.body_shapes
         ],
         "markers": [{"name": marker.label, **n.marker(marker)} for marker in mechanism.presentation.named_markers],

@@ -107,8 +107,25 @@ class Port:
     symbols: tuple[str, ...]
 
 
+class Signature:
+    """What straight-line functions and drivers share: their inputs."""
+
+    ports: tuple[Port, ...]
+
+    @property
+    def n_in(self) -> int:
+        """Length of x."""
+        return sum(len(port.symbols) for port in self.ports)
+
+    @property
+    def arguments(self) -> dict[str, int]:
+        """Lengths of the arguments by name; [q; v] is one, x."""
+        lengths = {port.name: len(port.symbols) for port in self.ports}
+        return {"x": self.n_in} if tuple(lengths) == ("q", "v") else lengths
+
+
 @dataclass(frozen=True)
-class Block:
+class Block(Signature):
     """A straight-line function of the concatenated inputs of its ports."""
 
     name: str
@@ -132,29 +149,19 @@ class Block:
         return (*self.outputs, *self.checks, *self.guards)
 
     @property
-    def n_in(self) -> int:
-        """Length of x."""
-        return sum(len(port.symbols) for port in self.ports)
-
-    @property
     def n_out(self) -> int:
         """Length of out."""
         return len(self.outputs)
 
 
 @dataclass(frozen=True)
-class KernelDriver:
+class KernelDriver(Signature):
     """A public function that target code with loops and Newton iterations computes from blocks."""
 
     name: str
     ports: tuple[Port, ...]
     shape: tuple[int, ...]
     blocks: tuple[str, ...]  #: names of the blocks it calls
-
-    @property
-    def n_in(self) -> int:
-        """Length of x."""
-        return sum(len(port.symbols) for port in self.ports)
 
     @property
     def n_out(self) -> int:

@@ -10,7 +10,8 @@ read allows; segments of several kinds that take turns are one, so that less is 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from functools import partial
 from heapq import heapify, heappop, heappush
 from itertools import chain, groupby
 
@@ -26,6 +27,7 @@ from .statements import CIRCULAR
 Place = tuple[str, float]
 #: Statements with what they read by number, and which of them are checked or are results, how often.
 Signature = tuple[object, ...]
+Segment = tuple[int, ...]  #: statements in order
 
 
 class SegmentReader:
@@ -43,7 +45,7 @@ class SegmentReader:
         self.single = single
         self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
 
-    def read(self, segment: tuple[int, ...]) -> tuple[Signature, tuple[int, ...]]:
+    def read(self, segment: Segment) -> tuple[Signature, tuple[int, ...]]:
         """The signature of a segment, and what it reads from outside in order of first use."""
         if segment not in self.found:
             self.found[segment] = self._read(segment)
@@ -150,8 +152,6 @@ def _free_parts(taken: np.ndarray, start: int, end: int) -> list[tuple[int, int]
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-Segment = tuple[int, ...]
-
 PERIOD = 16  #: kinds that alternate at most
 CALLS = 8  #: of functions that have to be spared
 
@@ -238,14 +238,14 @@ def find_segments(program: Program, block: Block, known_places: Mapping[int, Pla
     reader = SegmentReader(graph, known, results, checked, single)
     groups = _grouped(graph, _apart(parts(graph, left), single), items - kept, single)
     common = _common(reader, [tuple(chain.from_iterable(group)) for group in groups])
-    segments: list[tuple[int, ...]] = []
+    segments: list[Segment] = []
     for group, alike in zip(groups, common, strict=True):
         segments += [tuple(chain.from_iterable(group))] if alike else group
     segments = _merged(segments, _kept(reader, segments))
     if program.is_searched(block.name):
-        segments = _repeated(reader, segments, _kept(reader, segments), 2 * longest)
+        segments = _cut(segments, _kept(reader, segments), partial(_repeated, reader, 2 * longest))
         segments = _merged(segments, _kept(reader, segments))
-    segments = _shortened(segments, _kept(reader, segments), longest)
+    segments = _cut(segments, _kept(reader, segments), partial(_equal_parts, length=longest))
     segments = _alternating(reader, segments, longest)
     read = [reader.read(segment) for segment in segments]
     return _laid_out(segments, read, tuple(angles), known, results, checked, lists)
@@ -263,14 +263,14 @@ def _apart(every: Sequence[tuple[int, Sequence[int]]], single: Collection[int]) 
 
 def _grouped(
     graph: Graph, every: Sequence[tuple[int, tuple[int, ...]]], items: Collection[int], single: Collection[int]
-) -> list[list[tuple[int, ...]]]:
+) -> list[list[Segment]]:
     """Segments of several passes over one body together, as far as what they read allows.
 
     A segment goes to the last group that it reads from, unless that holds one of the same pass, or a list.  Entries of
     lists (``items``) are there when their list is.
     """
     nodes = graph.nodes
-    groups: list[list[tuple[int, ...]]] = []
+    groups: list[list[Segment]] = []
     passes: list[set[int]] = []
     home: dict[int, int] = {}
     for number, segment in every:
@@ -286,54 +286,54 @@ def _grouped(
     return groups
 
 
-def _common(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+def _common(reader: SegmentReader, segments: Sequence[Segment]) -> list[bool]:
     """Whether a segment is one of several of its kind."""
     signatures = [reader.read(segment)[0] for segment in segments]
     counts = Counter(signatures)
     return [counts[signature] >= FEW for signature in signatures]
 
 
-def _kept(reader: SegmentReader, segments: Sequence[tuple[int, ...]]) -> list[bool]:
+def _kept(reader: SegmentReader, segments: Sequence[Segment]) -> list[bool]:
     """Whether a segment stays as it is: one of several of its kind, or a list."""
     alike = _common(reader, segments)
     return [segment[0] in reader.single or common for segment, common in zip(segments, alike, strict=True)]
 
 
-def _merged(segments: Sequence[tuple[int, ...]], common: Sequence[bool]) -> list[tuple[int, ...]]:
+def _merged(segments: Sequence[Segment], common: Sequence[bool]) -> list[Segment]:
     """Segments; rare ones that follow each other are one."""
-    result: list[tuple[int, ...]] = []
+    result: list[Segment] = []
     for alike, run in groupby(zip(segments, common, strict=True), key=lambda pair: pair[1]):
         every = [segment for segment, _ in run]
         result += every if alike else [tuple(chain.from_iterable(every))]
     return result
 
 
-def _repeated(
-    reader: SegmentReader, segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int
-) -> list[tuple[int, ...]]:
-    """Segments; rare ones are cut where they repeat themselves."""
-    result: list[tuple[int, ...]] = []
-    for segment, alike in zip(segments, common, strict=True):
-        done = 0
-        for start, period, count in () if alike else find_repeats(reader.letters(segment), longest):
-            result += [segment[done:start]] if start > done else []
-            done = start + period * count
-            result += [segment[k : k + period] for k in range(start, done, period)]
-        result += [segment[done:]] if done < len(segment) else []
-    return result
+Cut = Callable[[Segment], list[Segment]]
 
 
-def _shortened(segments: Sequence[tuple[int, ...]], common: Sequence[bool], longest: int) -> list[tuple[int, ...]]:
-    """Segments; rare ones are as long as may be."""
-    result: list[tuple[int, ...]] = []
-    for segment, alike in zip(segments, common, strict=True):
-        step = len(segment) if alike else longest
-        result += [segment[k : k + step] for k in range(0, len(segment), step)]
-    return result
+def _cut(segments: Sequence[Segment], common: Sequence[bool], cut: Cut) -> list[Segment]:
+    """Segments; rare ones are cut."""
+    pairs = zip(segments, common, strict=True)
+    return [part for segment, alike in pairs for part in ([segment] if alike else cut(segment))]
+
+
+def _equal_parts(segment: Segment, length: int) -> list[Segment]:
+    """Parts of this length, the last one shorter."""
+    return [segment[k : k + length] for k in range(0, len(segment), length)]
+
+
+def _repeated(reader: SegmentReader, longest: int, segment: Segment) -> list[Segment]:
+    """A segment cut where it repeats itself."""
+    result, done = list[Segment](), 0
+    for start, period, count in find_repeats(reader.letters(segment), longest):
+        result += [segment[done:start]] if start > done else []
+        done = start + period * count
+        result += _equal_parts(segment[start:done], period)
+    return [*result, segment[done:]] if done < len(segment) else result
 
 
 def _laid_out(
-    segments: Sequence[tuple[int, ...]],
+    segments: Sequence[Segment],
     read: Sequence[tuple[Signature, tuple[int, ...]]],
     angles: tuple[int, ...],
     known: dict[int, Place],

@@ -13,6 +13,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from threading import Timer
+from typing import Any
 
 from ..errors import ToolchainError, UsageError, bad_cache, no_choice
 from .cache import Cache, CacheEntry, cache_directory, compute_key, digest_writers
@@ -37,17 +38,15 @@ from .compiler import (
 from .layer import HEADERS, LAYER, SOLVER
 from .trusted_files import read_entry
 
-Progress = Callable[[str], None]
 Task = Callable[[Commands], Path]  #: makes an object file
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 QUIET = 1.0  #: seconds that lanes may be compiled without a line on stderr
 
 
 def compile_sources(
-    kind: str, sources: Mapping[str, str], name: str, options: Options, progress: Progress | None = None,
-    key: str | None = None,
-) -> CacheEntry:  # fmt: skip
-    """Compile the C files and headers of a model, or find it in the cache; ``progress`` takes a line for each step.
+    kind: str, sources: Mapping[str, str], name: str, options: Options, key: str | None = None
+) -> CacheEntry:
+    """Compile the C files and headers of a model, or find it in the cache.
 
     Kind ``model`` is for this session, a library that shows its table and takes the solvers of ``eomgen._native``;
     without the option ``lanes``, lanes and series are left to :func:`compile_lanes`.  ``library`` is for C programs or
@@ -78,26 +77,28 @@ def compile_sources(
         "native": describe_native(compiler, tuple(machine_flags(options, compiler))) if options.native else "",
         **_setting(compiler),
     }  # fmt: skip
-    cache, key = Cache(cache_directory()), key or compute_key(parts)
-    if (entry := cache.find(key)) is not None:
-        return entry
-    with cache.attempt(key) as directory:
-        (directory / "sources").mkdir(mode=0o700)
-        for file, text in sources.items():
-            (directory / "sources" / file).write_text(text, encoding="utf-8", newline="\n")
-        of_layer = [file for file in files if file in LAYER]
-        objects: list[Task] = [
-            partial(_shared_object, cache, sources, f, of_solvers if f == SOLVER else flags, compiler, progress)
-            for f in of_layer
-        ]
+    cache = Cache(cache_directory())
+    of_layer = {file: of_solvers if file == SOLVER else flags for file in files if file in LAYER}
+    objects = [partial(_shared_object, cache, sources, file, of, compiler) for file, of in of_layer.items()]
+    recipe = {
+        "compiler": [*compiler.command, compiler.version], "flags": flags, "link": link, "options": asdict(options),
+        # features of the processor, by NumPy's names, without which this code cannot run
+        "needs": NEEDS[WITH_AVX] if "-mavx" in flags else (),
+    }  # fmt: skip
+
+    def compiled(directory: Path) -> tuple[str, Mapping[str, Any]]:
+        _write(directory / "sources", sources)
         of_model = {Path("sources", file): flags for file in files if file not in of_layer}
-        product = compile_and_link(directory, f"lib{name}", of_model, link, compiler, options.jobs, progress, objects)
-        recipe = {
-            "compiler": [*compiler.command, compiler.version], "flags": flags, "link": link, "options": asdict(options),
-            # features of the processor, by NumPy's names, without which this code cannot run
-            "needs": NEEDS[WITH_AVX] if "-mavx" in flags else (),
-        }  # fmt: skip
-        return cache.publish(directory, key, kind, name, product, recipe)
+        return compile_and_link(directory, f"lib{name}", of_model, link, compiler, options.jobs, objects), recipe
+
+    return cache.make(key or compute_key(parts), kind, name, compiled)
+
+
+def _write(directory: Path, texts: Mapping[str, str]) -> None:
+    """Write texts by name into a folder of this user, which is made."""
+    directory.mkdir(mode=0o700, exist_ok=True)
+    for name, text in texts.items():
+        (directory / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _setting(compiler: CompilerInfo) -> dict[str, object]:
@@ -131,25 +132,23 @@ def solver_flags(flags: Sequence[str], options: Options, compiler: CompilerInfo)
 
 def _shared_object(
     cache: Cache, sources: Mapping[str, str], file: str, flags: Sequence[str], compiler: CompilerInfo,
-    progress: Progress | None, commands: Commands,
+    commands: Commands,
 ) -> Path:  # fmt: skip
     """Find the object of a C file that reads the layer's texts alone, never a model's, or compile it."""
     texts = {name: text for name, text in sources.items() if name.endswith(".h") and name in (*LAYER, *HEADERS)}
     texts[file] = sources[file]
     parts = {"kind": "object", "sources": texts, "flags": flags, **_setting(compiler)}
-    entry = cache.find(key := compute_key(parts))
-    if entry is None:
-        with cache.attempt(key) as directory:
-            for name, text in texts.items():
-                (directory / name).write_text(text, encoding="utf-8", newline="\n")
-            made = _compile_file(directory, Path(file), flags, compiler, progress, commands)
-            entry = cache.publish(directory, key, "object", Path(file).stem, made.name, {"flags": flags})
-    return entry.product
+
+    def compiled(directory: Path) -> tuple[str, Mapping[str, Any]]:
+        _write(directory, texts)
+        return _compile_file(directory, Path(file), flags, compiler, commands).name, {"flags": flags}
+
+    return cache.make(compute_key(parts), "object", Path(file).stem, compiled).product
 
 
 def compile_and_link(
     directory: Path, name: str, files: Mapping[Path, Sequence[str]], link: Sequence[str], compiler: CompilerInfo,
-    jobs: int | None = None, progress: Progress | None = None, objects: Sequence[Task] = (), suffix: str = SUFFIX,
+    jobs: int | None = None, objects: Sequence[Task] = (), suffix: str = SUFFIX,
 ) -> str:  # fmt: skip
     """Compile C files, given by their places in a directory with their flags, into a library there; its file's name.
 
@@ -157,12 +156,8 @@ def compile_and_link(
     stays in the directory; ``objects`` make further object files, which stay where they are.
     Raises ToolchainError (the compiler fails, does not come to an end, or made nothing).
     """
-    tasks: list[Task] = [
-        partial(_compile_file, directory, file, flags, compiler, progress) for file, flags in files.items()
-    ]
+    tasks: list[Task] = [partial(_compile_file, directory, file, flags, compiler) for file, flags in files.items()]
     made = run_all([*tasks, *objects], jobs)
-    if progress is not None:
-        progress(f"linking {name}")
     product = f"{name}{suffix}"
     command = [*compiler.command, *map(str, made), "-o", product, *link]
     size = sum(path.stat().st_size for path in made)
@@ -174,12 +169,9 @@ def compile_and_link(
 
 
 def _compile_file(
-    directory: Path, file: Path, flags: Sequence[str], compiler: CompilerInfo, progress: Progress | None,
-    commands: Commands,
-) -> Path:  # fmt: skip
+    directory: Path, file: Path, flags: Sequence[str], compiler: CompilerInfo, commands: Commands
+) -> Path:
     """Compile a file of a directory into an object there."""
-    if progress is not None:
-        progress(f"compiling {file.name}")
     source, product = directory / file, directory / f"{file.name}.o"
     command = [*compiler.command, *flags, "-c", str(file), "-o", product.name]
     commands.run(command, directory, allowed(source.stat().st_size), f"compiling {source}")
@@ -239,11 +231,13 @@ def compile_lanes(file: Path) -> CacheEntry | None:
     timer = Timer(QUIET, print, [message], {"file": sys.stderr})
     timer.daemon = True
     timer.start()
+
+    def compiled(directory: Path) -> tuple[str, Mapping[str, Any]]:
+        paths = {files[f]: flags for f in chosen}
+        return compile_and_link(directory, f"{name}_lanes", paths, recipe["link"], compiler), {"flags": flags}
+
     try:
-        with cache.attempt(key) as directory:
-            paths = {files[f]: flags for f in chosen}
-            product = compile_and_link(directory, f"{name}_lanes", paths, recipe["link"], compiler)
-            return cache.publish(directory, key, "lanes", name, product, {"flags": flags})
+        return cache.make(key, "lanes", name, compiled)
     finally:
         timer.cancel()
 

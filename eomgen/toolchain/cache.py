@@ -16,7 +16,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,7 +66,7 @@ class CacheEntry(NamedTuple):
     """A published build."""
 
     key: str  #: SHA-256 of everything it depends on
-    kind: str  #: ``model``, ``library``, ``lanes``, ``object`` or ``numpy``
+    kind: str  #: ``model``, ``library``, ``lanes``, ``object``, ``numpy`` or ``web``
     name: str  #: of the model
     directory: Path  #: where it lies; ``sources/`` in it holds the texts that a model was made from
     product: Path  #: the file to load or link
@@ -119,8 +119,22 @@ class Cache:
             if os.path.lexists(folder):
                 files.require_trusted(folder)
 
+    def make(
+        self, key: str, kind: str, name: str, build: Callable[[Path], tuple[str, Mapping[str, Any]]]
+    ) -> CacheEntry:
+        """The entry of a key, built if need be, by one rename; or that of another process which was faster.
+
+        ``build`` puts the files to keep, and nothing else, into a private directory, and returns the name of the file
+        to load or link and how it was made: compiler, flags, options.
+        """
+        if (entry := self.find(key)) is not None:
+            return entry
+        with self._attempt(key) as directory:
+            product, recipe = build(directory)
+            return self._publish(directory, key, kind, name, product, recipe)
+
     @contextmanager
-    def attempt(self, key: str) -> Iterator[Path]:
+    def _attempt(self, key: str) -> Iterator[Path]:
         """A private directory to build in; removed at the end unless published, kept after a ToolchainError."""
         try:
             for folder in (self.root, self._entries, self._attempts):
@@ -150,14 +164,9 @@ class Cache:
 
         return Path(mkdtemp(prefix=f"{prefix}-", dir=self._attempts))
 
-    def publish(
+    def _publish(
         self, attempt: Path, key: str, kind: str, name: str, product: str, recipe: Mapping[str, Any]
     ) -> CacheEntry:
-        """Make the entry of a key from an attempt, by one rename; or that of another process which was faster.
-
-        The attempt, a directory from :meth:`attempt`, holds the files to keep, one named `product`, and nothing else.
-        `recipe` says how it was made: compiler, flags, options.
-        """
         paths = sorted(attempt.rglob("*"))
         for path in paths:  # whatever the umask of the compiler
             path.chmod(path.stat().st_mode & ~files.OTHERS_WRITE)

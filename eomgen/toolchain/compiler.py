@@ -250,12 +250,15 @@ def _candidates(command: str | None, variable: str) -> list[tuple[str, ...]]:
             raise ToolchainError(f"{origin} is not a command: {error}: {line}", code="EG-COMPILER-MISSING") from None
     # Of Python's compiler only the program: the flags that follow it there were for building Python.
     of_python = [(program,) for program in str(sysconfig.get_config_var("CC") or "").split()[:1]]
-    candidates = [*of_python, ("gcc",), ("clang",), ("cc",), ("zig", "cc")]
+    return [*of_python, ("gcc",), ("clang",), ("cc",), ("zig", "cc"), *((str(zig), "cc") for zig in zig_of_python())]
+
+
+def zig_of_python() -> list[Path]:
+    """The zig of the package ziglang, where that is installed."""
     spec = importlib.util.find_spec("ziglang")
-    if spec is not None and spec.origin is not None:
-        zig = Path(spec.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")
-        candidates.append((str(zig), "cc"))
-    return candidates
+    if spec is None or spec.origin is None:
+        return []
+    return [Path(spec.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")]
 
 
 def _which(program: str, search_path: str | None = None) -> str | None:
@@ -299,11 +302,17 @@ def lane_width() -> int:
     """States side by side in the kernels that are compiled here: what this processor takes at a time."""
     if not is_x86():
         return 2
-    try:  # NumPy has asked the processor already; its dispatch relies on this table
+    return next(width for width, needs in NEEDS.items() if numpy_features().issuperset(needs))
+
+
+@cache
+def numpy_features() -> frozenset[str]:
+    """Features of this processor by NumPy's names; NumPy has asked it already, its dispatch relies on this table."""
+    try:
         features = import_module("numpy._core._multiarray_umath").__cpu_features__
     except (ImportError, AttributeError):
-        return 2
-    return next(width for width, needs in NEEDS.items() if all(features.get(name) for name in needs))
+        return frozenset()
+    return frozenset(name for name, there in features.items() if there)
 
 
 def is_x86() -> bool:

@@ -10,27 +10,20 @@ from ..base.files import shipped
 from ..base.operations import tape_rows
 from ..native.limits import definitions
 
-#: Parts of the steppers' source, in order: a part may use what stands in those before it.
-STEPPERS = ("control", "lu", "newton", "radau", "loop")
-
 #: Headers of the solvers, which models include whose functions are not all straight-line code.
 SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_straight.h")
 SOLVER = "eomgen_solvers.c"
-#: Parts of that source, in order.
-SOLVERS = ("linear_algebra", "projection", "embedding", "singular", "trees", "jacobian")
 
-#: The layer's files, the first translated by Cython, and the templates each is put together from.
+#: The layer's files, the first translated by Cython, and what each is put together from, in order: a part may use what
+#: stands in those before it.
 LAYER = {
     "_native.pyx": ("_native.pyx",),
     "eomgen_steppers.h": ("steppers/eomgen_steppers.h",),
     "eomgen_methods.h": ("steppers/runge_kutta.c", "steppers/taylor.c"),
-    "eomgen_steppers.c": tuple(f"steppers/{name}.c" for name in STEPPERS),
-    SOLVER: tuple(f"{name}.c" for name in SOLVERS),
+    "eomgen_steppers.c": tuple(f"steppers/{name}.c" for name in ("control", "lu", "newton", "radau", "loop")),
+    SOLVER: ("linear_algebra.c", "projection.c", "embedding.c", "singular.c", "trees.c", "jacobian.c"),
     "eomgen_contacts.h": ("contacts/eomgen_contacts.h",),
-    "eomgen_contact_steps.h": (
-        *("steppers/lu.c", "contacts/impulses.c"),
-        *("contacts/collide.c", "contacts/step.c"),
-    ),
+    "eomgen_contact_steps.h": ("steppers/lu.c", "contacts/impulses.c", "contacts/collide.c", "contacts/step.c"),
     "eomgen_contacts.c": ("contacts/contacts.c",),
     "eomgen_ensembles.h": ("ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("ensembles/ensembles.c",),

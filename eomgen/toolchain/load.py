@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial, reduce, wraps
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ from ..errors import (  # fmt: skip
     not_finite,
 )
 from .cache import Cache, CacheEntry, cache_directory, compute_key
+from .compiler import numpy_features
 from .native import find_native
 from .trusted_files import load_source, read_entry, read_trusted, require_trusted
 
@@ -97,10 +97,7 @@ def _require_features(manifest: Mapping[str, Any], file: Path) -> None:
 @cache
 def processor_features() -> frozenset[str]:
     """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
-    result = {platform.machine()}
-    with suppress(ImportError, AttributeError):
-        features = import_module("numpy._core._multiarray_umath").__cpu_features__
-        result |= {name for name, there in features.items() if there}
+    result = {platform.machine(), *numpy_features()}
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith(("flags", "Features")):
@@ -178,13 +175,13 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     module_name = f"eomgen._{name}_{key[:16]}"
     if not twins and (result := find_module(module_name)) is not None:
         return result
+
+    def written(directory: Path) -> tuple[str, Mapping[str, Any]]:
+        (directory / NUMPY).write_text(text, encoding="utf-8")
+        return NUMPY, {}
+
     try:
-        kept = Cache(cache_directory())
-        if (entry := kept.find(key)) is None:
-            with kept.attempt(key) as attempt:
-                (attempt / NUMPY).write_text(text, encoding="utf-8")
-                entry = kept.publish(attempt, key, "numpy", name, NUMPY, {})
-        path = str(entry.product)
+        path = str(Cache(cache_directory()).make(key, "numpy", name, written).product)
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         path = f"<{module_name}>"
     return load_source(module_name, path, text.encode(), twins).model

@@ -75,28 +75,19 @@ def find_function(name: str) -> Callable[..., Any]:
     return result
 
 
+TRACED = Target(
+    "", "codegen.targets.traced.package", functions="codegen.targets.traced.functions", arrays=True,
+    kernels=TRACED_KERNELS,
+)  # fmt: skip
+
 TARGETS: dict[str, Target] = {
     "cython": Target("extension module", "codegen.package.cython_package", load="codegen.targets.cython.load"),
     "numpy": Target(
-        "functions of NumPy arrays for a session, no compiler",
-        load="codegen.targets.numpy.load",
-        arrays=True,
+        "functions of NumPy arrays for a session, no compiler", load="codegen.targets.numpy.load", arrays=True
     ),
     "c": Target("C library", "codegen.targets.c.c_library", precisions=True),
-    "casadi": Target(
-        "set of functions of CasADi's SX",
-        "codegen.targets.traced.casadi_package",
-        functions="codegen.targets.traced.functions",
-        arrays=True,
-        kernels=TRACED_KERNELS,
-    ),
-    "jax": Target(
-        "set of pure functions of JAX",
-        "codegen.targets.traced.jax_package",
-        functions="codegen.targets.traced.functions",
-        arrays=True,
-        kernels=TRACED_KERNELS,
-    ),
+    "casadi": TRACED._replace(about="set of functions of CasADi's SX"),
+    "jax": TRACED._replace(about="set of pure functions of JAX"),
     "cuda": Target(
         "set of functions of many states on NVIDIA GPUs",
         "codegen.targets.cuda.cuda_package",

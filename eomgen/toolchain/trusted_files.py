@@ -254,16 +254,6 @@ class Kept:
             with suppress(OSError):
                 part.unlink()
 
-    def names(self) -> Iterator[str]:
-        """What is there, the remains of killed writers too."""
-        with suppress(OSError):
-            yield from sorted(os.listdir(self.folder))
-
-    def remove(self, name: str) -> None:
-        """Remove a file."""
-        with suppress(OSError):
-            (self.folder / name).unlink()
-
 
 def _kept_seal(name: str, content: bytes) -> bytes:
     return hashlib.sha256(name.encode() + b"\0" + content).digest()

@@ -74,7 +74,7 @@ def describe_device(program: Program) -> dict[str, Any]:
     return {
         "name": program.name,
         "n_const": count_constants(program, print_block(program, program.precompute)),
-        "kernels": {k.name: ([list(port) for port in _ports(k)], list(k.shape)) for k in _kernels(program)},
+        "kernels": {k.name: ([list(port) for port in k.arguments.items()], list(k.shape)) for k in _kernels(program)},
         "methods": list(METHODS) if _no_runs(program) == "" else [],
         "no_runs": _no_runs(program),
         "x0": example_state(program),
@@ -83,12 +83,6 @@ def describe_device(program: Program) -> dict[str, Any]:
 
 def _kernels(program: Program) -> list[Block | KernelDriver]:
     return [k for k in program.kernels if k.n_out and k.name in DEVICE_KERNELS]
-
-
-def _ports(kernel: Block | KernelDriver) -> list[tuple[str, int]]:
-    """Arguments and their lengths; [q; v] is one, x."""
-    names = tuple(port.name for port in kernel.ports)
-    return [("x", kernel.n_in)] if names == ("q", "v") else [(port.name, len(port.symbols)) for port in kernel.ports]
 
 
 def _no_runs(program: Program) -> str:
@@ -118,7 +112,7 @@ def _context(program: Program) -> dict[str, Any]:
     name, projects = program.name, bool(sizes.n_c or program.quaternion_slots)
     kernels = []
     for k in _kernels(program):
-        ports = _ports(k)
+        ports = list(k.arguments.items())
         starts = [sum(length for _, length in ports[:i]) for i in range(len(ports))]
         one = {"name": k.name, "n_in": k.n_in, "n_out": k.n_out, "ports": ports, "starts": starts}
         kernels.append(one | {"work": _work(program, {k.name})})

@@ -12,7 +12,7 @@ import platform
 import re
 import sys
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -395,65 +395,18 @@ _FOLDERS = {
 _WHEN = (1980, 1, 1, 0, 0, 0)  #: the same model gives the same bytes
 
 
-def write_fmu(
-    program: Program,
-    module: BoundModel,
-    path: str | Path | None = None,
-    version: str = "2.0",
-    progress: Callable[[str], None] | None = None,
-) -> Path:
-    """Write a functional mock-up unit: model exchange and co-simulation in one file, with its sources in C.
-
-    Parameters
-    ----------
-    program : Program
-        With the kernels :data:`~eomgen.toolchain.targets.FMU_KERNELS`.
-    module : BoundModel
-        The model, for its initial state.
-    path : str or Path, optional
-        Of the file, by default ``<name>.fmu`` here; a file of this name is replaced.
-    version : {'2.0', '3.0'}, optional
-        Of FMI.
-    progress : callable, optional
-        Told what is being done, a line at a time.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    ModelError
-        A parameter has no value, or the model has impacts: events with ``restitution``, or contacts with
-        law ``rigid``.
-    UsageError
-        An unknown version, or a file name that does not end in ``.fmu``.
-    ToolchainError
-        No compiler, or it failed.
-
-    Notes
-    -----
-    Variables of the unit: coordinates and velocities, their derivatives ``der(name)``, inputs, parameters (which can be
-    set between steps), outputs and the values of events, with units and texts.  Start values are those of the model's
-    initial state.  Coordinates that loops make dependent follow from the independent ones during initialization.
-    """
+def write_fmu(program: Program, module: BoundModel, path: str | Path | None = None, version: str = "2.0") -> Path:
+    """The file of :meth:`eomgen.api.equations.Equations.write_fmu`; ``module`` has the initial state."""
     version = check_version(version)
     where = as_path("path", path if path is not None else f"{program.name}.fmu")
     if where.suffix != ".fmu":
         raise bad_file(f"the name of an FMU ends in .fmu, not as in {str(where)!r}")
-    write_whole(where, fmu_bytes(program, module, version, progress))
+    write_whole(where, fmu_bytes(program, module, version))
     return where
 
 
 def generate_fmu(program: Program, module: BoundModel, directory: Path, version: str) -> Path:
-    """Write ``<name>.fmu`` into a folder, in the place of one that eomgen wrote before.
-
-    Raises
-    ------
-    UsageError
-        There is another file of this name.
-    """
+    """Write ``<name>.fmu`` into a folder; see :func:`~..files.own_file`."""
     return write_fmu(program, module, own_file(directory, f"{program.name}.fmu", _is_ours), version)
 
 
@@ -478,9 +431,7 @@ def _begin_signals(program: Program, module: BoundModel) -> tuple[Program, Array
     return replace(program, metadata={**program.metadata, "u_values": values}), bound.x0()
 
 
-def fmu_bytes(
-    program: Program, module: BoundModel, version: str, progress: Callable[[str], None] | None = None
-) -> bytes:
+def fmu_bytes(program: Program, module: BoundModel, version: str) -> bytes:
     """The content of the file that :func:`write_fmu` writes; the same model gives the same bytes."""
     refuse_impacts(program)
     program, start = _begin_signals(program, module)
@@ -490,7 +441,7 @@ def fmu_bytes(
     if folder is not None:
         code = {Path(name).name: text for name, text in texts.items() if name.endswith((".c", ".h"))}
         options = Options(extra=("-fvisibility=hidden",))
-        library = compile_sources("library", code, program.name, options, progress).product
+        library = compile_sources("library", code, program.name, options).product
         files[f"binaries/{folder}/{program.name}{library.suffix}"] = library.read_bytes()
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:

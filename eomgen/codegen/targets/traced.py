@@ -43,16 +43,6 @@ class Traced(NamedTuple):
     function: str  #: how it is made
 
 
-def casadi_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
-    """Functions of CasADi's SX with named arguments."""
-    return _package(program, context, "casadi")
-
-
-def jax_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
-    """Pure functions of JAX arrays in 64 bits."""
-    return _package(program, context, "jax")
-
-
 def emit_traced(program: Program, library: str) -> str:
     """The text of the module ``<name>`` for 'casadi' or 'jax', of :data:`~...toolchain.targets.TRACED_KERNELS`.
 
@@ -61,8 +51,9 @@ def emit_traced(program: Program, library: str) -> str:
     return render("traced/__init__.py.j2", _context(program, library))
 
 
-def _package(program: Program, context: dict[str, Any], library: str) -> dict[str, str]:
-    context = context | _context(program, library)
+def package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Functions of CasADi's SX with named arguments, or pure functions of JAX arrays in 64 bits."""
+    context = context | _context(program, context["target"])
     return {
         "py.typed": "",
         "__init__.py": render("traced/__init__.py.j2", context),
@@ -132,13 +123,11 @@ def _public(program: Program, minimal: bool) -> list[Traced]:
     for kernel in program.kernels:
         if kernel.name not in TRACED_KERNELS or kernel.name == "kinematics" or not kernel.n_out:
             continue
-        ports = {port.name: len(port.symbols) for port in kernel.ports}
-        arguments = {"x": kernel.n_in} if tuple(ports) == ("q", "v") else ports
         function = f"straight(block_{kernel.name})"
         if kernel.name in drivers:
             function = OF_LOOPS[kernel.name] if program.has_loops else f"{kernel.name}_of_tree"
             function = "tree_mass_matrix" if kernel.name == "mass_matrix" else function
-        collected.append(Traced(kernel.name, arguments, kernel.shape, NAMED[kernel.name].result, function))
+        collected.append(Traced(kernel.name, kernel.arguments, kernel.shape, NAMED[kernel.name].result, function))
     if minimal:
         n = 2 * sizes.n_dof - sizes.n_states
         takes = {"z": n, "q_guess": sizes.n_q}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import shutil
 import sys
@@ -43,7 +42,7 @@ from ...show.build_scene import build_scene
 from ...show.frames import sample
 from ...show.page import InlinePage, page_html, scene_position
 from ...toolchain.cache import Cache, cache_directory, compute_key
-from ...toolchain.compiler import run
+from ...toolchain.compiler import run, zig_of_python
 from ...toolchain.layer import read_layer
 from ..build import program_of
 from ..c import emit_c
@@ -73,11 +72,9 @@ READ = 12_000  #: operations of the equations; longer ones take minutes to write
 
 def find_compiler() -> list[str]:
     """The command of a C compiler for WebAssembly. Raises ToolchainError (there is none)."""
-    zig, spec = shutil.which("zig"), importlib.util.find_spec("ziglang")
-    if zig is None and spec is not None and spec.origin is not None:
-        zig = str(Path(spec.origin).with_name("zig"))
-    if zig is not None:
-        return [zig, "cc", "-target", "wasm32-wasi", "-fno-sanitize=undefined"]
+    for zig in (shutil.which("zig"), *zig_of_python()):
+        if zig is not None:
+            return [str(zig), "cc", "-target", "wasm32-wasi", "-fno-sanitize=undefined"]
     kit = os.environ.get("WASI_SDK_PATH", "")
     clang = shutil.which(f"{kit}/bin/clang" if kit else "clang")
     if clang is not None and (kit or shutil.which("wasm-ld")):
@@ -197,16 +194,15 @@ def compile_wasm(program: Program, method: str) -> bytes:
     sources["web.c"] = definitions(face) + face
     flags = [*FLAGS, f"-DWEB_METHOD=eomgen_{METHODS.get(method, 'dop853')}"]
     key = compute_key({"kind": "web", "sources": sources, "flags": flags, "command": command})
-    cache = Cache(cache_directory())
-    entry = cache.find(key)
-    if entry is None:
-        with cache.attempt(key) as folder:
-            for name, text in sources.items():
-                (folder / name).write_text(text, encoding="utf-8")
-            files, product = sorted(name for name in sources if name.endswith(".c")), f"{program.name}.wasm"
-            run([*command, *flags, *files, "-o", product], folder, SECONDS, f"compiling {program.name} for a page")
-            entry = cache.publish(folder, key, "web", program.name, product, {"flags": flags})
-    made = entry.product.read_bytes()
+
+    def compiled(folder: Path) -> tuple[str, dict[str, Any]]:
+        for name, text in sources.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        files, product = sorted(name for name in sources if name.endswith(".c")), f"{program.name}.wasm"
+        run([*command, *flags, *files, "-o", product], folder, SECONDS, f"compiling {program.name} for a page")
+        return product, {"flags": flags}
+
+    made = Cache(cache_directory()).make(key, "web", program.name, compiled).product.read_bytes()
     if b"wasi_snapshot_preview1" in made:
         raise ToolchainError(
             f"the C functions of {program.name} call the system, which a page does not have; give them nothing of C "
@@ -361,13 +357,7 @@ def page(module: BoundModel, /, file: Path | str | None = None, trajectory: Any 
 
 
 def generate_web(program: Program, module: BoundModel, directory: Path, version: str) -> Path:
-    """Write ``<name>.html`` into a folder, in the place of one that eomgen wrote before.
-
-    Raises
-    ------
-    UsageError
-        There is another file of this name.
-    """
+    """Write ``<name>.html`` into a folder; see :func:`~..files.own_file`."""
     return page(module, own_file(directory, f"{program.name}.html", _is_ours))
 
 
