@@ -25,7 +25,7 @@ from .program import Block, Program
 
 #: Bytes of the registers that a function saves, its return address and alignment, on processors of up to 32 registers.
 _FRAME = 32 * 8
-PAIRS = 5  #: of states beside a change point, as in eomgen/native/singular.c
+PAIRS = 5  #: of states beside a change point, as in eomgen/native/right_hand_side.c
 _PLACE = 8  #: bytes of a variable, also where numbers or pointers have 4
 _NUMBER = re.compile(r"\b([A-Z]\w*) = ([\w +*]+)")
 _STRUCT = re.compile(r"typedef struct (?:\w+ )?\{\n(.*?)\} (\w+);", re.DOTALL)
