@@ -36,13 +36,12 @@ if TYPE_CHECKING:
     from .analysis.regressor import standard_parameters as _standard_parameters
     from .analysis.sensitivities import sensitivities as _sensitivities
     from .codegen.targets.web import page as _page
-    from .runtime.canonical import Canonical
     from .runtime.constrained import multipliers as _multipliers
     from .runtime.drawing import draw as _draw
     from .runtime.drawing import draw_branches as _draw_branches
     from .runtime.drawing import report as _report
     from .runtime.ensembles.ensemble import simulate_many as _simulate_many
-    from .runtime.minimal import Minimal
+    from .runtime.minimal import Canonical, Minimal
     from .runtime.runs.dae_solution import Dae
     from .runtime.runs.integrator import integrator as _integrator
     from .runtime.runs.integrator import step as _step
@@ -86,7 +85,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
 #: Other form of the same equations -> the file of its class.
 FORMS = {
     "minimal": "runtime.minimal",
-    "canonical": "runtime.canonical",
+    "canonical": "runtime.minimal",
     "dae": "runtime.runs.dae_solution",
 }
 

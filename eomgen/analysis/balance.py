@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..base import algebra
-from ..base.algebra import Array, Indices
+from ..base.algebra import Array, Indices, Partition, partition, rank
 from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
-from ..base.ranks import Partition, partition, rank
 from ..base.scales import tangent_projector
 from ..errors import ill_chosen
 from ..runtime.argument_checks import read_names, unknown

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import algebra
-from ..base.algebra import Array
+from ..base.algebra import Array, partition
 from ..base.limits.constraints import STATE as RANK
 from ..base.limits.numbers import TINY
 from ..base.names import hint, joined
-from ..base.ranks import partition
 from ..base.results import Result, plain, same_keys
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
 from ..runtime.argument_checks import read_names, read_numbers

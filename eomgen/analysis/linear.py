@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.algebra import Array, Indices
-from ..base.ranks import rank
+from ..base.algebra import Array, Indices, rank
 from ..base.scales import minimum_norm
 from ..errors import cannot, ill_chosen, ill_shaped, no_choice
 from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown

@@ -11,10 +11,9 @@ import numpy as np
 
 from ..errors import AssemblyError
 from . import algebra
-from .algebra import Array, Indices
+from .algebra import Array, Indices, rank
 from .limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, STATE, TIKHONOV
 from .limits.positions import BESIDE, NULL
-from .ranks import rank
 from .scales import Position, Scales, largest, settle
 
 # -- starts ------------------------------------------------------------------------------------------------------------

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.algebra import rank
 from ..base.assembly import Assembly, ConstraintSystem, differences
 from ..base.continuation import Continuation, HeldPath
 from ..base.limits.constraints import BESIDE, CHOSEN, CONTRADICTION, FLAT
 from ..base.names import hint, joined
-from ..base.ranks import rank
 from ..elements.constraints import Driver, RollingDisc
 from ..elements.constraints.rolling import LYING
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError, Problem

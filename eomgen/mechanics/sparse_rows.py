@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base import algebra
-from ..base.algebra import Array, Indices
+from ..base.algebra import Array, Indices, Level, parts, rank
 from ..base.limits.constraints import PREFERENCE, STRUCTURE, UNMOVED
-from ..base.ranks import Level, parts, rank
 
 # -- rows and columns of one matrix ------------------------------------------------------------------------------------
 
@@ -175,7 +174,7 @@ class SparseRows:
 
     @cached_property
     def rank(self) -> int:
-        """As :func:`~eomgen.base.ranks.rank` counts it."""
+        """As :func:`~eomgen.base.algebra.rank` counts it."""
         return sum(part.rank for part in self._entries) if self._entries else rank(self.J, self.tolerance).rank
 
     def motions(self, rank: int) -> Array:

@@ -28,7 +28,7 @@ def _in_c(limit: object) -> str:
     return "{" + ", ".join(map(repr, limit)) + "}" if isinstance(limit, tuple) else repr(limit)
 
 
-# -- interpolation across a change point (eomgen/native/right_hand_side.c) ------------------------------------------------
+# -- interpolation across a change point (eomgen/native/right_hand_side.c) ---------------------------------------------
 #: A crossing is looked for where the weakest pivot is smaller; accelerations, known to V^2 EXACT / pivot^3, keep 1e-11
 #: there. NEAR_SQUARE: the same of squares of sines between columns.
 CROSSINGS_NEAR = 0.05

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base import algebra
-from ..base.algebra import correlated
+from ..base.algebra import correlated, partition
 from ..base.limits.numbers import LEAST, SINGULAR
-from ..base.ranks import partition
 from ..errors import NonFiniteError, PartitionError, SingularMassMatrixError, UnavailableError
 from ..expr import vectors as vec
 from ..expr.core import Expr, substitute, symbols_of

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .inputs import Signal
+from .inputs import Expression, Signal
 from .kernels import eager
-from .tapes import Expression
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base import algebra
-from ..base.algebra import Array, Indices
+from ..base.algebra import Array, Indices, parts, rank
 from ..base.assembly import (
     RESTARTS,
     ClosureSystem,
@@ -38,7 +38,6 @@ from ..base.limits.constraints import (
     UNMOVED,
 )
 from ..base.names import place_of_marker
-from ..base.ranks import parts, rank
 from ..base.scales import largest
 from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
 from .argument_checks import UnknownNameError, unknown, without_dots

@@ -32,7 +32,7 @@ ALWAYS = ("events", "resets")  #: entries that every model has, also where they 
 class ModelInfo:
     """What a module knows of its model without any expression: the schema of model.json, both ways.
 
-    Entries with a default are left out of the file where they have it.  A tape is as :mod:`.tapes` has it, a place one
+    Entries with a default are left out of the file where they have it.  A tape is as :mod:`.inputs` has it, a place one
     in q, v, x, u or p; numbers of bodies count from 0, and -1 is ground.
     """
 

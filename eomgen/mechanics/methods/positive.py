@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ...base import algebra
-from ...base.algebra import Array, correlated
+from ...base.algebra import Array, correlated, partition
 from ...base.limits.constraints import UNMOVED
 from ...base.limits.numbers import EPS, LEAST, NOTHING, SINGULAR, TINY, WORTH_A_WORD
-from ...base.ranks import partition
 from ...errors import EvaluationError, ModelError, PartitionError, Problem
 from ...expr.evaluate import Evaluator, evaluate
 from ...expr.records import dataclass

@@ -28,10 +28,9 @@ from ...errors import (
 )
 from ..argument_checks import read_numbers
 from ..constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers, with_closed_rows
-from ..inputs import derive, drift, moving_inputs, rate_pairs
+from ..inputs import Expression, derive, drift, moving_inputs, rate_pairs
 from ..kernels import eager
 from ..layout import Layout
-from ..tapes import Expression
 from .impact_equations import Sliding, collide, require_distances, strike
 
 if TYPE_CHECKING:

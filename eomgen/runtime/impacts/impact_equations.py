@@ -45,11 +45,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import algebra
-from ...base.algebra import Array
+from ...base.algebra import Array, rank
 from ...base.limits.constraints import MEASURED
 from ...base.limits.impacts import COUPLED, ENDLESS, FREE, GAINS, GIVES, LEFT, PUSHES, REACHED, STILL, STRUCK
 from ...base.limits.numbers import EPS
-from ...base.ranks import rank
 from ...errors import cannot, untrue
 
 if TYPE_CHECKING:

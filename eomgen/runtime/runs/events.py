@@ -37,10 +37,9 @@ from ...errors import (
     untrue,
 )
 from ..argument_checks import as_real, check_names, require_mapping, require_time_and_state, without_dots
-from ..inputs import read_text
+from ..inputs import Expression, joined, read_text
 from ..layout import Layout, within
 from ..refusals import require_switched
-from ..tapes import Expression, joined
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel
