@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -73,7 +73,7 @@ def for_each(batch: int, check: Callable[..., None], *more: Any, count: int = 30
     seed(batch)(options(given(st.tuples(mechanisms(), *more))(judged)))()
 
 
-@cache
+@lru_cache(maxsize=64)  # of two batches: all take gigabytes
 def compiled(recipe: Recipe) -> tuple[Made, Any]:
     """The mechanism, with its module; where a screw was to be cut and another joint is, its recipe says so."""
     made = Made(recipe)
