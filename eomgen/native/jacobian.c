@@ -83,47 +83,56 @@ static int project_velocities(const eom_at *at)
     return status;
 }
 
-/* The change of the projected state for the unit change of x[column]: dq and dv in their areas. */
-static int project_direction(const eom_at *at, int column)
+/* The nearest velocities, in the area of dv, along which the projected coordinates move for the unit change of q[k]. */
+static int project_position(const eom_at *at, int k)
 {
-    const double *const s = AT(SCALES), *const r3 = AT(ALONG) + N + M;
+    const double *const s = AT(SCALES);
     double *const dq = AT_DQ, *const dv = AT_DV, *const r = AT(RATE);
-    int status = 0;
-    set_unit(NX, column, dq);
+    set_unit(NX, k, dq);
     fill(M, 0.0, r);
-    if (column < NQ) {
-        find_velocities(at, AT(X), dq, dv);
-        for (int i = 0; i < MH && MODEL->coordinate_slopes != NULL; i++) {
-            r[i] = AT(GRADIENT)[i * NQ + column];
-        }
-        divide(N, s, dv);
-        status = correct_change(at, MH, holonomic_gram(at), r, dv);
-        if (MODEL->coordinate_slopes != NULL) {
-            add_left(at, holonomic_gram(at), r, dv, dq);
-        }
-        multiply(N, s, dv);
-        spread(at, AT(X), dv, dq);
-        rate_along(at);
-        for (int i = 0; i < M; i++) {
-            r[i] = r3[i] / s[N + i];
-        }
+    find_velocities(at, AT(X), dq, dv);
+    for (int i = 0; i < MH && MODEL->coordinate_slopes != NULL; i++) {
+        r[i] = AT(GRADIENT)[i * NQ + k];
     }
-    for (int k = 0; k < N; k++) {
-        dv[k] = NQ + k == column ? 1.0 / s[k] : 0.0;
-    }
-    if (status == 0) {
-        return project_velocities(at);
+    divide(N, s, dv);
+    const int status = correct_change(at, MH, holonomic_gram(at), r, dv);
+    if (MODEL->coordinate_slopes != NULL) {
+        add_left(at, holonomic_gram(at), r, dv, dq);
     }
     multiply(N, s, dv);
     return status;
+}
+
+/* The change of the projected state along velocities in the area of dv: dq and dv in their areas. shift: how
+   C_q v + C_t changes besides, or NULL. */
+static int follow_position(const eom_at *at, const double *restrict shift)
+{
+    const double *const s = AT(SCALES), *const r3 = AT(ALONG) + N + M;
+    double *const dv = AT_DV, *const r = AT(RATE);
+    spread(at, AT(X), dv, AT_DQ);
+    rate_along(at);
+    for (int i = 0; i < M; i++) {
+        r[i] = (shift == NULL ? r3[i] : r3[i] + shift[i]) / s[N + i];
+    }
+    fill(N, 0.0, dv);
+    return project_velocities(at);
+}
+
+/* The same for the unit change of v[k]. */
+static int project_velocity(const eom_at *at, int k)
+{
+    fill(NQ, 0.0, AT_DQ);
+    set_unit(N, k, AT_DV);
+    AT_DV[k] = 1.0 / AT(SCALES)[k];
+    fill(M, 0.0, AT(RATE));
+    return project_velocities(at);
 }
 
 /* The change of the projected state where C and C_q v + C_t change by C and r3 of AT(SHIFT): dq and dv in their
    areas. */
 static int project_shift(const eom_at *at)
 {
-    const double *const s = AT(SCALES), *const along = AT(ALONG) + N + M;
-    const double *const C = AT(SHIFT), *const r3 = C + MH + N + M;
+    const double *const s = AT(SCALES), *const C = AT(SHIFT);
     double *const dq = AT_DQ, *const dv = AT_DV, *const r = AT(RATE);
     fill(NX, 0.0, dq);
     for (int i = 0; i < MH; i++) {
@@ -131,13 +140,8 @@ static int project_shift(const eom_at *at)
     }
     const int status = correct_change(at, MH, holonomic_gram(at), r, dv);
     multiply(N, s, dv);
-    spread(at, AT(X), dv, dq);
-    rate_along(at);
-    for (int i = 0; i < M; i++) {
-        r[i] = (along[i] + r3[i]) / s[N + i];
-    }
-    fill(N, 0.0, dv);
-    return status == 0 ? project_velocities(at) : status;
+    const int followed = follow_position(at, C + MH + N + M);
+    return status == 0 ? followed : status;
 }
 
 /* The column of derivatives where the projected state changes by dq and dv and residuals by r1 and r2 (N + M, in
@@ -153,15 +157,34 @@ static void solve_column(const eom_at *at, int column, int columns, double *rest
     put_column(at, column, columns, AT_DQ, AT_DV, da, out);
 }
 
+/* The column of x' along the change of the projected state. */
+static void change_column(const eom_at *at, int column, double *restrict out)
+{
+    residuals_along(at);
+    solve_column(at, column, NX, AT(ALONG), out);
+}
+
+/* Where q' = v and every constraint is of positions, units of q[k] and v[k] move along the same velocities. */
 static int jacobian_by_partition(const eom_at *at, const double *restrict x, double *restrict out,
                                  double *restrict weakest)
 {
+    const int alike = PLAIN_RATES && MH == M && MODEL->coordinate_slopes == NULL;
     int status = prepare_derivatives(at, x, weakest);
-    for (int column = 0; column < NX && status == 0; column++) {
-        status = project_direction(at, column);
+    for (int k = 0; k < NQ && status == 0; k++) {
+        status = project_position(at, k);
+        if (status == 0 && alike) {
+            fill(NQ, 0.0, AT_DQ);
+            change_column(at, NQ + k, out);
+        }
+        status = status == 0 ? follow_position(at, NULL) : status;
         if (status == 0) {
-            residuals_along(at);
-            solve_column(at, column, NX, AT(ALONG), out);
+            change_column(at, k, out);
+        }
+    }
+    for (int k = 0; k < N && status == 0 && !alike; k++) {
+        status = project_velocity(at, k);
+        if (status == 0) {
+            change_column(at, NQ + k, out);
         }
     }
     return status;

@@ -231,7 +231,8 @@ static double noise_along(const eom_at *at, int rows, const double *restrict z)
 static int correct_linear(const eom_at *at, int rows, double *restrict G, const double *restrict r,
                           double *restrict x, int order)
 {
-    const double *const J = AT(J);
+    const int n = N;
+    const double *const restrict J = AT(J);
     double *const e = AT(E), *const z = e + M, relative = CONSTRAINTS_GENTLE, before = HUGE_VAL;
     int status = 0;
     for (int pass = 0; pass < 50 && status == 0; pass++) {
@@ -240,8 +241,8 @@ static int correct_linear(const eom_at *at, int rows, double *restrict G, const 
         for (int i = 0; i < rows; i++) {
             double total = fabs(r[i]);
             e[i] = r[i];
-            for (int k = 0; k < N; k++) {
-                const double term = J[i * N + k] * x[k];
+            for (int k = 0; k < n; k++) {
+                const double term = J[i * n + k] * x[k];
                 e[i] += term;
                 total += fabs(term);
             }
@@ -249,7 +250,7 @@ static int correct_linear(const eom_at *at, int rows, double *restrict G, const 
                 return EOMGEN_NON_FINITE;
             }
             left = left || fabs(e[i]) > ROUNDING_SUMMED * total;
-            longest = fmax(longest, fabs(e[i]));
+            longest = fabs(e[i]) > longest ? fabs(e[i]) : longest;
             square += e[i] * e[i];
             z[i] = e[i];
         }
@@ -272,8 +273,8 @@ static int correct_linear(const eom_at *at, int rows, double *restrict G, const 
             }
         }
         for (int i = 0; i < rows; i++) {
-            for (int k = 0; k < N; k++) {
-                x[k] -= J[i * N + k] * z[i];
+            for (int k = 0; k < n; k++) {
+                x[k] -= J[i * n + k] * z[i];
             }
         }
         before = longest;
