@@ -108,6 +108,7 @@ def takes_jacobian(solver: Any) -> bool:
 
 ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_steppers.h
 STATUS = {ENDED: 0, TERMINAL: 1}  #: SciPy's
+LOUD = nullcontext()
 TOO_SMALL = "Required step size is less than spacing between numbers."
 MESSAGES = {
     ENDED: "The solver successfully reached the end of the integration interval.",
@@ -148,19 +149,15 @@ def integrate(
         "trail": KEPT if module.layout.rank else 0, "watch": None if watch is None else watch.look, "stall_check": look,
     }  # fmt: skip
     if isinstance(method, str):
-        steps = (
-            require_one(options["rtol"]),
-            options["atol"],
-            options.get("max_step", inf),
-            options.get("first_step", 0.0),
-        )
-        run = core.run(method, module.kernels.context, start, x0, end, *steps, forcing.encode(), plan)
+        rtol, atol = require_one(options["rtol"]), options["atol"]
+        steps = options.get("max_step", inf), options.get("first_step", 0.0)
+        run = core.run(method, module.kernels.context, start, x0, end, rtol, atol, *steps, forcing.encode(), plan)
     else:
         plan |= {"make": partial(_make, method, rates, forcing, nodes, dict(options)), "rates": rates}
         plan["inputs"] = forcing if forcing else None
         run = core.called("called", module.kernels.context, start, x0, end, 0.0, 0.0, inf, 0.0, (), plan)
     status, raised = 0, None
-    quiet = nullcontext() if isinstance(method, str) else np.errstate(all="ignore")  # NaN of a failure shortens a step
+    quiet = LOUD if isinstance(method, str) else np.errstate(all="ignore")  # NaN of a failure shortens a step
     try:
         with quiet:
             status = run.proceed()

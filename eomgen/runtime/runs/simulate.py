@@ -268,7 +268,7 @@ def simulate(
         forcing.require_finite()
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = Run(bound, forcing)
-    if any(event.action == WAIT for event in watched.model) and not is_inner_run():
+    if watched.model and any(event.action == WAIT for event in watched.model) and not is_inner_run():
         from ..impacts.impact import describe_negative_gaps
 
         if message := describe_negative_gaps(bound, start, x0, watched.declared, forcing):
