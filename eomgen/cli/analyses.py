@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import numpy as np
 
 from ..analysis.linearization import without_noise
@@ -15,75 +14,60 @@ from ..base.files import whole_file
 from ..base.limits.numbers import SHOWN_FORCE
 from ..base.results import ResultTable
 from ..errors import at_odds, bad_file, ill_typed, incomplete, no_such
-from .options import (
-    Number,
-    NumberRange,
-    Prepared,
-    analysis_verb,
-    end_option,
-    file_option,
-    parse_settings,
-    require_folder,
-    split_names,
-)
-from .output import BREACH, show, stage
+from .options import Count, End, Names, NumberRange, Prepared, Seed, Texts, Time, parse_settings, require_folder, verb
+from .output import BREACH, stage
 
 if TYPE_CHECKING:
     from ..module import Module
 
 COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
-time_option = click.option("--time", "t", type=Number(), default=0.0, show_default=True, metavar="T", help="Time in s.")
 
-
-@analysis_verb
-@time_option
-@click.option(
-    "--equilibrium", "at_rest", is_flag=True, help="Linearize about the equilibrium found from the initial position."
-)
-@click.option("--full", is_flag=True, help="Use all of x as states, not only the independent ones.")
-def linearize(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool) -> None:
+@verb()
+def linearize(
+    work: Prepared,
+    t: Time = 0.0,
+    equilibrium: Annotated[bool, "Linearize about the equilibrium found from the initial position."] = False,
+    full: Annotated[bool, "Use all of x as states, not only the independent ones."] = False,
+) -> None:
     """Linearize a model about its initial state, or about an equilibrium.
 
     States are independent displacements and velocities along the constraints, so constraints add no eigenvalues.
     """
     module = work.module
-    x = module.equilibrium(work.position(), t).x if at_rest else module.x0(work.initial, t=t)
-    work.show(as_json, t, module.linearize(x, t, form="full" if full else "minimal"))
+    x = module.equilibrium(work.position(), t).x if equilibrium else module.x0(work.initial, t=t)
+    work.show(t, module.linearize(x, t, form="full" if full else "minimal"))
 
 
-@analysis_verb
-@time_option
-def modes(work: Prepared, t: float, as_json: bool) -> None:
+@verb()
+def modes(work: Prepared, t: Time = 0.0) -> None:
     """Find natural frequencies and mode shapes about the equilibrium found from the initial position."""
     rest = work.module.equilibrium(work.position(), t)
     result = work.module.modes(rest.x, t)
     about = {"coordinates": rest.coordinates, "stability": rest.stability}
-    work.show(as_json, t, rest, result, values=about | result.to_dict())
+    work.show(t, rest, result, values=about | result.to_dict())
 
 
-@analysis_verb
-@time_option
-@click.option("--hold", multiple=True, metavar="NAME[=VALUE]", help="Coordinate that is held; repeat it for more.")
-@click.option("--unknown", multiple=True, metavar="NAME", help="Parameter or input to solve for; repeat it for more.")
-def equilibrium(work: Prepared, t: float, hold: tuple[str, ...], unknown: tuple[str, ...], as_json: bool) -> None:
+@verb()
+def equilibrium(
+    work: Prepared,
+    t: Time = 0.0,
+    hold: Annotated[Texts, "NAME[=VALUE]: Coordinate that is held; repeat it for more."] = (),
+    unknown: Annotated[Texts, "NAME: Parameter or input to solve for; repeat it for more."] = (),
+) -> None:
     """Find a static equilibrium from the initial position; --set NAME=VALUE of a coordinate changes the guess."""
     held: dict[str, float | None] = dict.fromkeys(word for word in hold if "=" not in word)
     held |= parse_settings(tuple(word for word in hold if "=" in word), "--hold", "theta=0.3")
-    work.show(as_json, t, work.module.equilibrium(work.position(), t, hold=held, unknowns=unknown))
+    work.show(t, work.module.equilibrium(work.position(), t, hold=held, unknowns=unknown))
 
 
-@analysis_verb
-@click.option(
-    "--by",
-    multiple=True,
-    callback=split_names,
-    metavar="NAME",
-    help="Parameter, input or initial value; by default all parameters.",
-)
-@end_option
-@file_option("--out", "Write them to FILE.npz or FILE.csv.")
-def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Path | None, as_json: bool) -> None:
+@verb()
+def sensitivity(
+    work: Prepared,
+    by: Annotated[Names, "NAME: Parameter, input or initial value; by default all parameters."] = (),
+    end: End = None,
+    out: Annotated[Path | None, "FILE: Write them to FILE.npz or FILE.csv."] = None,
+) -> None:
     """Integrate a model together with its derivatives, and report the derivatives at the end."""
     if out is not None and out.suffix not in (".npz", ".csv"):
         raise bad_file(f"--out {out}: sensitivities are written as .npz or .csv")
@@ -95,18 +79,16 @@ def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Pat
         result = work.module.sensitivities(names, end, work.initial)
     files = [] if out is None else [result.save(out)]
     held = f"held at the start: {', '.join(result.held)}"
-    work.show(as_json, float(result.t[-1]), *result.tables, held, values=result.to_dict(), files=files)
+    work.show(float(result.t[-1]), *result.tables, held, values=result.to_dict(), files=files)
 
 
-@analysis_verb
-@time_option
-@click.option(
-    "--weight", multiple=True, metavar="NAME=W", help="Weight of a change of a coordinate or rate; default 1."
-)
-@click.option("--mass", is_flag=True, help="Weight changes by the mass matrix of the tree instead.")
-@click.option("--hold", multiple=True, metavar="NAME", help="Coordinate or rate that keeps its value exactly.")
+@verb()
 def consistent(
-    work: Prepared, t: float, weight: tuple[str, ...], mass: bool, hold: tuple[str, ...], as_json: bool
+    work: Prepared,
+    t: Time = 0.0,
+    weight: Annotated[Texts, "NAME=W: Weight of a change of a coordinate or rate; default 1."] = (),
+    mass: Annotated[bool, "Weight changes by the mass matrix of the tree instead."] = False,
+    hold: Annotated[Texts, "NAME: Coordinate or rate that keeps its value exactly."] = (),
 ) -> None:
     """Bring a rough state (--set, the rest as declared) onto the constraints with the least change."""
     if weight and mass:
@@ -124,23 +106,22 @@ def consistent(
     columns = [without_noise(states[key].tolist(), units) for key in ("rough", "x", "change")]
     rows = [[name, a, b, f"{c:.3g}"] for name, a, b, c in zip(names, *columns, strict=True)]
     table = ResultTable(["", "given", "consistent", "change"], rows, "the nearest state on the constraints")
-    work.show(as_json, t, table, values={key: _by_name(names, x) for key, x in states.items()})
+    work.show(t, table, values={key: _by_name(names, x) for key, x in states.items()})
 
 
 def _by_name(names: Sequence[str], values: Any) -> dict[str, Any]:
     return dict(zip(names, values.tolist(), strict=True))
 
 
-@analysis_verb
-@time_option
-@click.option(
-    "--end",
-    type=Number(),
-    metavar="T",
-    help="Simulate to T and give the largest values; without it those of the initial state.",
-)
-@file_option("--out", "With --end: write histories to FILE.csv or .npz.")
-def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_json: bool) -> None:
+@verb()
+def reactions(
+    work: Prepared,
+    t: Time = 0.0,
+    end: Annotated[
+        float | None, "T: Simulate to T and give the largest values; without it those of the initial state."
+    ] = None,
+    out: Annotated[Path | None, "FILE: With --end: write histories to FILE.csv or .npz."] = None,
+) -> None:
     """Find the force and moment that each joint's predecessor exerts on its successor, in ground axes (N, N m).
 
     Components that redundant constraints leave undetermined are marked with *; the smallest reactions are given.
@@ -175,7 +156,7 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     ]
     notes = ["* not determined by rigid bodies: the constraints are redundant"] if marks.any() else []
     table = ResultTable(["joint", *COMPONENTS], rows, title)
-    work.show(as_json, t, table, *notes, values=values, files=[] if out is None else [out])
+    work.show(t, table, *notes, values=values, files=[] if out is None else [out])
 
 
 def _write_reactions(out: Path, module: Module, times: Any, result: Any) -> None:
@@ -190,13 +171,13 @@ def _write_reactions(out: Path, module: Module, times: Any, result: Any) -> None
             np.savetxt(file, table, delimiter=",", header=head, comments="", encoding="utf-8")
 
 
-@analysis_verb
-@time_option
-@click.option("--actuated", multiple=True, metavar="NAME", help="Driven coordinate or input; repeat it for more.")
-@click.option(
-    "--accelerate", multiple=True, metavar="NAME=VALUE", help="Acceleration of an independent coordinate, 0 by default."
-)
-def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tuple[str, ...], as_json: bool) -> None:
+@verb()
+def inverse(
+    work: Prepared,
+    t: Time = 0.0,
+    actuated: Annotated[Texts, "NAME: Driven coordinate or input; repeat it for more."] = (),
+    accelerate: Annotated[Texts, "NAME=VALUE: Acceleration of an independent coordinate, 0 by default."] = (),
+) -> None:
     """Find the forces of drives for given accelerations at the initial state; loops stay closed."""
     module, layout = work.module, work.module.layout
     x = module.x0(work.initial, t=t)
@@ -206,7 +187,6 @@ def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tup
     units = {name: layout.unit(name) if name in layout.u else kinds.get(layout.unit(name), "") for name in forces}
     more = {"accelerations": accelerations, "constraints": module.constraint_labels, "joints": module.joint_names}
     work.show(
-        as_json,
         t,
         _with_units(f"forces of the drives at t = {t:g} s", forces, units),
         _with_units("accelerations", accelerations, {name: layout.unit(name) for name in layout.a}),
@@ -221,27 +201,18 @@ def _with_units(title: str, values: dict[str, float], units: dict[str, str], siz
     return ResultTable((), rows, title)
 
 
-@analysis_verb
-@time_option
-@click.option(
-    "--gap", multiple=True, metavar="NAME=E", help="Gap (coordinate or output) that closes, with its restitution."
-)
-@click.option(
-    "--slip",
-    multiple=True,
-    metavar="NAME=MU:SPEED",
-    help="Friction of a gap: its coefficient and the output that is the sliding velocity; in space MU:SPEED:SPEED.",
-)
-@click.option("--stop", multiple=True, metavar="NAME", help="Coordinate that is locked suddenly; repeat it for more.")
-@click.option("--closed", is_flag=True, help="Treat the gaps as closed at any value.")
+@verb()
 def impact(
     work: Prepared,
-    t: float,
-    gap: tuple[str, ...],
-    slip: tuple[str, ...],
-    stop: tuple[str, ...],
-    closed: bool,
-    as_json: bool,
+    t: Time = 0.0,
+    gap: Annotated[Texts, "NAME=E: Gap (coordinate or output) that closes, with its restitution."] = (),
+    slip: Annotated[
+        Texts,
+        "NAME=MU:SPEED: Friction of a gap: its coefficient and the output that is the sliding velocity; in space "
+        "MU:SPEED:SPEED.",
+    ] = (),
+    stop: Annotated[Texts, "NAME: Coordinate that is locked suddenly; repeat it for more."] = (),
+    closed: Annotated[bool, "Treat the gaps as closed at any value."] = False,
 ) -> None:
     """Find the state after an impact at the initial state; friction acts with --slip."""
     from ..analysis.impact import check_friction, check_gaps
@@ -260,7 +231,7 @@ def impact(
     units = {name: layout.unit(name) for name in layout.v}
     table = _with_units("velocities after it", rates, units, result.before[module.n_q :].tolist())
     more = {"x": _by_name(module.x_names, result.x), "constraints": module.constraint_labels}
-    work.show(as_json, t, result, table, values=result.to_dict() | more)
+    work.show(t, result, table, values=result.to_dict() | more)
 
 
 def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
@@ -272,20 +243,18 @@ def _read_friction(text: str) -> tuple[str, tuple[str, tuple[str, ...]]]:
     return gap, (mu, tuple(names))
 
 
-@analysis_verb
-@click.option("--states", type=click.IntRange(min=1), default=6, show_default=True, help="Number of random states.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random states.")
-@click.option(
-    "--seconds",
-    type=NumberRange(min=0.0),
-    default=12.0,
-    show_default=True,
-    help="Time limit for all checks in s; variants get what is left.",
-)
-def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool) -> None:
+@verb()
+def verify(
+    work: Prepared,
+    states: Annotated[Count, "Number of random states."] = 6,
+    seed: Annotated[Seed, "Seed of the random states."] = 0,
+    seconds: Annotated[
+        float, NumberRange(min=0.0), "Time limit for all checks in s; variants get what is left."
+    ] = 12.0,
+) -> None:
     """Check a compiled model against independent computations; exit with 5 if a limit is exceeded."""
     with stage("verify"):
         result = work.module.verify(states=states, seed=seed, seconds=seconds)
     head = {"name": work.equations.name, "method": work.equations.method}
-    show(as_json, head | result.as_dict() | {"seconds": round(result.seconds, 3)}, str(result), files=None)
+    work.source.show(head | result.as_dict() | {"seconds": round(result.seconds, 3)}, str(result))
     sys.exit(0 if result.ok else BREACH)

@@ -6,7 +6,7 @@ import csv
 from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
@@ -14,16 +14,7 @@ from ..base.files import open_plain, save_figure, write_whole
 from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
 from ..runtime.argument_checks import require, require_size
 from ..runtime.storage import split_head, write_netcdf
-from .options import (
-    Prepared,
-    analysis_verb,
-    end_option,
-    file_option,
-    parse_span,
-    require_folder,
-    require_once,
-    solver_options,
-)
+from .options import Count, End, Integration, Prepared, Seed, Texts, parse_spans, require_folder, verb
 from .output import stage
 
 if TYPE_CHECKING:
@@ -33,43 +24,28 @@ SHOWN = 10  #: failures listed
 MOST_WORKERS = 4096  #: processes of a local cluster
 
 
-@analysis_verb
-@click.option(
-    "--cases",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    metavar="FILE",
-    help="CSV with a column for each name (parameter, input, coordinate, rate), a row for each run.",
-)
-@click.option(
-    "--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a random value between LOW and HIGH for each run."
-)
-@click.option(
-    "--grid", multiple=True, metavar="NAME=LOW:HIGH:COUNT", help="Take COUNT evenly spaced values, in all combinations."
-)
-@click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs for --vary.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random numbers.")
-@end_option
-@click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M evenly spaced times.")
-@click.option("--statistics", is_flag=True, help="Keep only mean, standard deviation, least and greatest values.")
-@click.option(
-    "--threads", type=click.IntRange(min=1), metavar="N", help="Number of runs at a time; by default all processors."
-)
-@click.option("--cluster", metavar="N|ADDRESS", help="Run on N local dask workers, or on the workers of a scheduler.")
-@click.option(
-    "--store",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Keep finished runs in DIR, and continue from there.",
-)
-@click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw column NAME to the picture FILE.")
-@file_option("--out", "Write results to FILE.npz, .csv or .nc.")
-@solver_options
+@verb()
 def ensemble(
-    work: Prepared, cases: Path | None, vary: tuple[str, ...], grid: tuple[str, ...], count: int | None,
-    seed: int, end: float | None,
-    samples: int | None, statistics: bool, threads: int | None, cluster: str | None, store: Path | None,
-    plot: tuple[str, str] | None, out: Path | None, as_json: bool, solver: dict[str, Any],
-) -> None:  # fmt: skip
+    work: Prepared,
+    solver: Integration,
+    cases: Annotated[
+        Path | None,
+        click.Path(path_type=Path, exists=True, dir_okay=False),
+        "FILE: CSV with a column for each name (parameter, input, coordinate, rate), a row for each run.",
+    ] = None,
+    vary: Annotated[Texts, "NAME=LOW:HIGH: Draw a random value between LOW and HIGH for each run."] = (),
+    grid: Annotated[Texts, "NAME=LOW:HIGH:COUNT: Take COUNT evenly spaced values, in all combinations."] = (),
+    count: Annotated[Count | None, "N: Number of runs for --vary."] = None,
+    seed: Annotated[Seed, "Seed of the random numbers."] = 0,
+    end: End = None,
+    samples: Annotated[int | None, click.IntRange(min=2), "M: Keep the states at M evenly spaced times."] = None,
+    statistics: Annotated[bool, "Keep only mean, standard deviation, least and greatest values."] = False,
+    threads: Annotated[Count | None, "N: Number of runs at a time; by default all processors."] = None,
+    cluster: Annotated[str | None, "N|ADDRESS: Run on N local dask workers, or on the workers of a scheduler."] = None,
+    store: Annotated[Path | None, "DIR: Keep finished runs in DIR, and continue from there."] = None,
+    plot: Annotated[tuple[str, str] | None, "NAME FILE: Draw column NAME to the picture FILE."] = None,
+    out: Annotated[Path | None, "FILE: Write results to FILE.npz, .csv or .nc."] = None,
+) -> None:
     """Run a model many times: for a table of cases, for random values, or over a grid of values."""
     if out is not None and out.suffix not in (".npz", ".csv", ".nc"):
         raise bad_file(f"--out {out}: ensembles are written as .npz, .csv or .nc")
@@ -103,7 +79,8 @@ def ensemble(
         result = module.simulate_many(
             end, *(group or None for group in sorted_values.values()), t_eval=times, grid=axes or None,
             threads=threads, reduce="statistics" if statistics else None,
-            cluster=int(cluster) if cluster is not None and cluster.isdigit() else cluster, store=store, **solver,
+            cluster=int(cluster) if cluster is not None and cluster.isdigit() else cluster, store=store,
+            **solver.keywords,
         )  # fmt: skip
     if out is not None:
         if out.suffix == ".csv":
@@ -120,7 +97,7 @@ def ensemble(
     if len(failures) > SHOWN:
         notes.append(f"... and {len(failures) - SHOWN} more of {result.count} failed")
     work.show(
-        as_json, float(result.t[-1]),
+        float(result.t[-1]),
         table._replace(title=f"{result.count} runs to t = {result.t[-1]:g} s; varied: {', '.join(varied)}"), *notes,
         values=result.to_dict() | {"varied": varied},
         files=[path for path in (out, plot and plot[1]) if path],
@@ -166,8 +143,7 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
     """Values drawn for each name, from a stream of its own."""
     import numpy as np
 
-    spans = [parse_span("--vary", word, "NAME=LOW:HIGH", "r=0.1:0.2") for word in vary]
-    require_once("--vary", [name for name, *_ in spans])
+    spans = parse_spans("--vary", vary, "NAME=LOW:HIGH", "r=0.1:0.2")
     drawn = {}
     for k, (name, low, high, _) in enumerate(spans):
         if not (isfinite(low) and isfinite(high) and low <= high):
@@ -178,6 +154,5 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
 
 def _read_grid(options: tuple[str, ...]) -> dict[str, tuple[float, float, int]]:
     """Low, high and count by name."""
-    spans = [parse_span("--grid", word, "NAME=LOW:HIGH:COUNT", "theta=0:2*pi:73") for word in options]
-    require_once("--grid", [name for name, *_ in spans])
+    spans = parse_spans("--grid", options, "NAME=LOW:HIGH:COUNT", "theta=0:2*pi:73")
     return {name: (low, high, count or 0) for name, low, high, count in spans}

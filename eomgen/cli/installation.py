@@ -16,7 +16,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import click
 
@@ -27,8 +27,8 @@ from ..base.results import ResultTable
 from ..base.texts import parse_python, visible
 from ..errors import EomgenError, at_odds, bad_file, no_such
 from ..expr.without_gc import timed
-from .options import NumberRange, Verb, json_option, target_option
-from .output import MODEL, TOOLCHAIN, exit_code, lines_of, print_json, readable_size, reports_failures, say, show, stage
+from .options import NumberRange, verb
+from .output import MODEL, TOOLCHAIN, exit_code, lines_of, print_json, readable_size, say, show, stage
 
 if TYPE_CHECKING:
     from ..toolchain.cache import Cache
@@ -74,9 +74,7 @@ class Check(NamedTuple):
     needed: bool = True
 
 
-@click.command(cls=Verb)
-@json_option
-@reports_failures
+@verb()
 def doctor(as_json: bool) -> None:
     """Check Python, packages, the compiler (by compiling a small model) and the cache; name a remedy for each fault."""
     findings = [*_python(), *_packages(), *_compiler(), _compiles(), _check_cache()]
@@ -214,9 +212,7 @@ def _cache() -> Cache:
     return Cache(cache_directory())
 
 
-@cache.command("list")
-@json_option
-@reports_failures
+@verb()
 def listing(as_json: bool) -> None:
     """List the compiled modules, the most recently used first."""
     kept = _cache()
@@ -233,14 +229,12 @@ def listing(as_json: bool) -> None:
     show(as_json, values, f"{kept.root}: {len(entries)} entries, {readable_size(size)}", *table, files=None)
 
 
-@cache.command()
-@click.option(
-    "--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove entries that were not used for DAYS."
-)
-@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest entries until MB are left.")
-@json_option
-@reports_failures
-def prune(older_than: float | None, max_size: float | None, as_json: bool) -> None:
+@verb()
+def prune(
+    as_json: bool,
+    older_than: Annotated[float | None, NumberRange(min=0), "DAYS: Remove entries that were not used for DAYS."] = None,
+    max_size: Annotated[float | None, NumberRange(min=0), "MB: Remove the oldest entries until MB are left."] = None,
+) -> None:
     """Remove the modules least recently used; without options those not used for 30 days."""
     if older_than is None and max_size is None:
         older_than = 30.0
@@ -254,15 +248,17 @@ def prune(older_than: float | None, max_size: float | None, as_json: bool) -> No
     show(as_json, values, f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}", files=None)
 
 
-@cache.command()
-@json_option
-@reports_failures
+@verb()
 def clear(as_json: bool) -> None:
     """Remove every compiled module."""
     kept = _cache()
     removed = kept.clear()
     values = {"directory": kept.root, "removed": removed}
     show(as_json, values, f"{kept.root}: removed {removed} entries", files=None)
+
+
+for _name, _verb in {"list": listing, "prune": prune, "clear": clear}.items():
+    cache.add_command(_verb, _name)
 
 
 def _ago(moment: float) -> str:
@@ -288,14 +284,15 @@ def describe_example(file: Path) -> str:
     return match.group(1).strip().strip('"') if match else ""
 
 
-@click.command(cls=Verb)
+@verb(targets=("numpy", "cython"))
 @click.argument("name", required=False)
-@click.option("--force", is_flag=True, help="Overwrite a file of that name.")
-@click.option("--all", "every", is_flag=True, help="Run every example for a tenth of its time, scripts in full.")
-@target_option("numpy", "cython", default="numpy")
-@json_option
-@reports_failures
-def examples(name: str | None, force: bool, every: bool, target: str, as_json: bool) -> None:
+def examples(
+    name: str | None,
+    target: str,
+    as_json: bool,
+    force: Annotated[bool, "Overwrite a file of that name."] = False,
+    every: Annotated[bool, "Run every example for a tenth of its time, scripts in full."] = False,
+) -> None:
     """List the example models, copy NAME into the current folder, or run them all.
 
     With --all the exit code is that of the first example that fails.  docs/gallery.md shows them.

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
 from ..base.files import save_figure, write_whole
 from ..base.results import ResultTable
 from ..toolchain.targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
-from .options import Source, file_option, model_verb, require_document_folder, require_folder, target_option
-from .output import print_json, say, show, stage
+from .options import Source, require_folder, verb
+from .output import print_json, say, stage
 from .plot import require_plotting
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
 
 DERIVED = ("allow_native", "method", "baumgarte", "independent", "robot")  #: options of what derives equations
+#: What no folder may stand for.
+FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 def _print_schema(context: click.Context) -> None:
@@ -28,7 +30,7 @@ def _print_schema(context: click.Context) -> None:
     context.exit()
 
 
-@model_verb("allow_native", "robot")
+@verb(("allow_native", "robot"))
 @click.option(
     "--schema",
     is_flag=True,
@@ -37,19 +39,15 @@ def _print_schema(context: click.Context) -> None:
     callback=lambda context, _, wanted: _print_schema(context) if wanted else None,
     help="Print the JSON Schema of model files, for editors, and stop.",
 )
-@click.option(
-    "--graph",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Draw bodies, joints and constraints as a graph (svg, png, pdf; needs matplotlib).",
-)
-@click.option(
-    "--draw",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Draw the mechanism at its initial position (svg, png, pdf; needs matplotlib).",
-)
-def check(source: Source, as_json: bool, graph: Path | None, draw: Path | None) -> None:
+def check(
+    source: Source,
+    graph: Annotated[
+        Path | None, FILE, "FILE: Draw bodies, joints and constraints as a graph (svg, png, pdf; needs matplotlib)."
+    ] = None,
+    draw: Annotated[
+        Path | None, FILE, "FILE: Draw the mechanism at its initial position (svg, png, pdf; needs matplotlib)."
+    ] = None,
+) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom of a model, and all its errors.
 
     Errors are printed as FILE:LINE: path: message; the exit code is then 1.
@@ -64,15 +62,12 @@ def check(source: Source, as_json: bool, graph: Path | None, draw: Path | None) 
         from ..show.draw import figure_at
 
         save_figure(figure_at(model.compile(target="numpy")), draw)
-    if as_json:
-        print_json(report.to_dict())
-    else:
-        show(False, {}, str(report), files=[file for file in (graph, draw) if file])
+    files = None if source.as_json else [file for file in (graph, draw) if file]
+    source.show(report.to_dict(), str(report), files=files)
 
 
-@model_verb("robot")
-@file_option("--out", "Write to FILE.yaml instead of stdout.")
-def convert(source: Source, out: Path | None, as_json: bool) -> None:
+@verb(("robot",))
+def convert(source: Source, out: Annotated[Path | None, "FILE: Write to FILE.yaml instead of stdout."] = None) -> None:
     """Write a robot (or a model file, tidied) as a model file.
 
     Properties that a model file cannot express are listed on stderr, and in comments at its top.
@@ -83,7 +78,7 @@ def convert(source: Source, out: Path | None, as_json: bool) -> None:
     text = model.to_yaml()
     if out is not None:
         write_whole(out, text)
-    if as_json:
+    if source.as_json:
         notes, renamed = list(model.notes), model.renamed
         print_json({"name": model.name, "file": str(out) if out else None, "notes": notes, "renamed": renamed})
     elif out is not None:
@@ -92,25 +87,26 @@ def convert(source: Source, out: Path | None, as_json: bool) -> None:
         click.echo(text, nl=False)
 
 
-@model_verb(*DERIVED)
-@click.option("--equations", is_flag=True, help="Also write out mass matrix and force (this loads SymPy).")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(FORMATS),
-    help="Write named intermediates, M and f of M v' = f for reading or for another program.",
-)
-@file_option("--out", "Output file of --format.")
-def derive(source: Source, equations: bool, form: str | None, out: Path | None, as_json: bool) -> None:
+@verb(DERIVED)
+def derive(
+    source: Source,
+    equations: Annotated[bool, "Also write out mass matrix and force (this loads SymPy)."] = False,
+    form: Annotated[
+        str | None,
+        click.Choice(FORMATS),
+        "Write named intermediates, M and f of M v' = f for reading or for another program.",
+    ] = None,
+    out: Annotated[Path | None, "FILE: Output file of --format."] = None,
+) -> None:
     """Derive the equations of motion; parameters need no values.
 
     Prints the mechanism and the operations of each part of the equations.
     """
     if out is not None and form is None:
         raise click.UsageError("--out needs --format")
-    if form is not None and as_json:
+    if form is not None and source.as_json:
         raise click.UsageError("--json and --format exclude each other")
-    require_document_folder("--out", out)
+    require_folder("--out", out, exists=True)
     derived = source.derive()
     if form is not None:
         from ..reading.formats import write_format
@@ -122,7 +118,7 @@ def derive(source: Source, equations: bool, form: str | None, out: Path | None, 
     else:
         written = _written(derived) if equations else {}
         parts = (str(derived.report), *operations_of(derived), *(_lines(written) if equations else ()))
-        show(as_json, summary(derived) | written, *parts, files=None)
+        source.show(summary(derived) | written, *parts)
 
 
 def summary(derived: Equations) -> dict[str, Any]:
@@ -172,26 +168,20 @@ def _lines(text: dict[str, Any]) -> Iterator[ResultTable | str]:
     yield from (f"  force[{i}] = {entry}" for i, entry in enumerate(text["force"]))
 
 
-@model_verb(*DERIVED)
-@file_option(
-    "--out",
-    "Document to write: .html (one page, offline), .md, .tex, or .pdf where pdflatex is installed.",
-    required=True,
-)
-@click.option(
-    "--level",
-    type=click.Choice(["short", "full"]),
-    default="full",
-    show_default=True,
-    help="short: topology, coordinates, final equations and counts.",
-)
-def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
+@verb(DERIVED)
+def explain(
+    source: Source,
+    out: Annotated[
+        Path, "FILE: Document to write: .html (one page, offline), .md, .tex, or .pdf where pdflatex is installed."
+    ],
+    level: Annotated[Literal["short", "full"], "short: topology, coordinates, final equations and counts."] = "full",
+) -> None:
     """Write the worked solution of a model.
 
     Mechanism, motion of each body, constraints, forces, the steps of the method, the equations, and one state with
     numbers, line by line.  The document ends with the largest difference between its formulas and the module.
     """
-    require_document_folder("--out", out)
+    require_folder("--out", out, exists=True)
     derived = source.derive()
     with stage("explain"):
         document = derived.explain(level)
@@ -199,38 +189,30 @@ def explain(source: Source, out: Path, level: str, as_json: bool) -> None:
     values: dict[str, Any] = {"file": str(out), "name": derived.name, "method": derived.method, "level": level}
     values |= {"sections": [s.title for s in document.sections], "difference": document.difference}
     difference = f"largest difference between the formulas and the compiled module: {document.difference or 0.0:.1e}"
-    show(as_json, values, str(out), *([] if document.difference is None else [difference]), files=None)
+    source.show(values, str(out), *([] if document.difference is None else [difference]))
 
 
-@model_verb(*DERIVED, "target", target=target_option(*TARGETS))
-@click.option(
-    "--out", required=True, metavar="DIR", type=click.Path(path_type=Path), help="Folder to write <name>/ into."
-)
-@click.option(
-    "--precision",
-    type=click.Choice(PRECISIONS),
-    default="double",
-    show_default=True,
-    help="Type of the numbers of a C library; float is for processors with single precision only.",
-)
-@click.option(
-    "--fmi",
-    type=click.Choice(FMI_VERSIONS),
-    default="2.0",
-    show_default=True,
-    help="Version of FMI, the standard of functional mock-up units, for target fmu.",
-)
-@click.option(
-    "--wheel",
-    is_flag=True,
-    help="Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython).",
-)
-@click.option(
-    "--analyses",
-    is_flag=True,
-    help="Also equilibria, linearization, reactions and all other analyses, without eomgen (cython).",
-)
-def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, analyses: bool, as_json: bool) -> None:
+@verb((*DERIVED, "target"), list(TARGETS))
+def generate(
+    source: Source,
+    out: Annotated[Path, "DIR: Folder to write <name>/ into."],
+    precision: Annotated[
+        str,
+        click.Choice(PRECISIONS),
+        "Type of the numbers of a C library; float is for processors with single precision only.",
+    ] = "double",
+    fmi: Annotated[
+        str,
+        click.Choice(FMI_VERSIONS),
+        "Version of FMI, the standard of functional mock-up units, for target fmu.",
+    ] = "2.0",
+    wheel: Annotated[
+        bool, "Also build a wheel, DIR/<name>-...whl, which pip installs elsewhere without a compiler (cython)."
+    ] = False,
+    analyses: Annotated[
+        bool, "Also equilibria, linearization, reactions and all other analyses, without eomgen (cython)."
+    ] = False,
+) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`.
 
     Targets fmu and web are one file, DIR/<name>.fmu and DIR/<name>.html.
@@ -254,4 +236,4 @@ def generate(source: Source, out: Path, precision: str, fmi: str, wheel: bool, a
     values = {"name": folder.stem, "target": target, "folder": str(folder), "files": files}
     values |= {"wheel": str(built.path), "note": built.note} if built else {}
     lines = [str(folder), *(f"  {name}" for name in files), *([str(built.path)] if built else [])]
-    show(as_json, values, *lines, files=None)
+    source.show(values, *lines)

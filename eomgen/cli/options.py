@@ -1,18 +1,25 @@
-"""What several verbs accept -> checked values: numbers, names, files, and a model with how to derive and compile it."""
+"""What several verbs accept -> checked values: numbers, names, files, and a model with how to derive and compile it.
+
+An option is an argument of a verb, or of a group of options such as :class:`Source`, whose annotation has a text:
+``end: Annotated[float, "T: End time in s."]``, what to write for its value and its help.
+"""
 
 from __future__ import annotations
 
 import functools
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import click
 
-from ..base.files import kind_of, refuse_link
+from ..base.files import example_files, kind_of, refuse_link
 from ..base.names import closest, place_of_marker
 from ..base.results import Result, ResultTable
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number, off_range
@@ -24,59 +31,6 @@ if TYPE_CHECKING:
     from ..api.equations import Equations
     from ..api.model import Model
     from ..module import Module
-
-# -- the help of a verb: its options in sections, its own first, those that many verbs share after them ----------------
-
-DERIVATION = "Derivation and compilation"
-INTEGRATION = "Integration"
-ROBOTS = "Robot files (URDF, MJCF)"
-#: Sections after the verb's own options, in this order.
-SHARED = (DERIVATION, INTEGRATION, ROBOTS)
-#: Names of the options at the end of the verb's own.
-LAST = ("--json", "--help")
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-class SharedOption(click.Option):
-    """An option of several verbs, which ``--help`` lists in a section of its own."""
-
-    def __init__(self, *args: Any, section: str, **attributes: Any) -> None:
-        super().__init__(*args, **attributes)
-        self.section = section
-
-
-def shared_option(section: str, *names: str, **attributes: Any) -> Callable[[F], F]:
-    """Like ``click.option``, listed in this section."""
-    return click.option(*names, cls=SharedOption, section=section, **attributes)
-
-
-class Verb(click.Command):
-    """A command whose help has a section for each kind of options, and which knows other words for them."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        try:
-            return super().parse_args(ctx, args)
-        except click.NoSuchOption as error:
-            names = {opt.lstrip("-"): opt for p in self.get_params(ctx) for opt in p.opts if opt.startswith("--")}
-            near = closest(error.option_name.lstrip("-"), names)
-            if not near:
-                raise
-            meant = f"No such option {error.option_name!r}; did you mean {names[near[0]]}?"
-            raise click.NoSuchOption(error.option_name, meant, ctx=ctx) from None
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        listed: dict[str, list[tuple[str, str]]] = {section: [] for section in ("Options", *SHARED)}
-        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
-        for option in sorted(options, key=lambda p: LAST.index(p.opts[-1]) if p.opts[-1] in LAST else -1):
-            record = option.get_help_record(ctx)
-            if record is not None:
-                listed[getattr(option, "section", "Options")].append(record)
-        for section, records in listed.items():
-            if records:
-                with formatter.section(section):
-                    formatter.write_dl(records)
-
 
 # -- numbers -----------------------------------------------------------------------------------------------------------
 
@@ -103,21 +57,10 @@ class NumberRange(click.FloatRange):
         return super().convert(_number(value), param, ctx)
 
 
-POSITIVE = NumberRange(min=0, min_open=True)
-
-
-def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
+def parse_settings(settings: Sequence[str], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
     """``name=value`` words as numbers; a value may be an expression of numbers such as ``pi/3``.
 
-    Parameters
-    ----------
-    settings : tuple of str
-    option, example : str, optional
-        Which option has them, for errors, and a word that it takes.
-
-    Raises
-    ------
-    UsageError
+    Errors name the option that has them, and an example of a word that it takes.
     """
     return dict(_parse_setting(word, option, example) for word in settings)
 
@@ -133,12 +76,7 @@ def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") ->
 
 
 def parse_number(text: str) -> float:
-    """A number, or an expression of numbers such as ``pi/3``.
-
-    Raises
-    ------
-    UsageError
-    """
+    """A number, or an expression of numbers such as ``pi/3``."""
     try:
         return float(text)
     except ValueError:
@@ -162,13 +100,25 @@ def parse_number(text: str) -> float:
 MOST_POINTS = 10_000_000  #: of a range
 
 
-def parse_span(option: str, word: str, form: str, example: str) -> tuple[str, float, float, int | None]:
-    """Name, ends and count of ``NAME=LOW:HIGH``, with a count where the form has one; ``[:COUNT]`` may be left out.
+class Span(NamedTuple):
+    """A range of values of a name."""
 
-    Raises
-    ------
-    UsageError
-    """
+    name: str
+    low: float
+    high: float
+    points: int | None
+
+
+def parse_spans(option: str, words: Sequence[str], form: str, example: str) -> list[Span]:
+    """Ranges ``NAME=LOW:HIGH``, with a count where the form has one; ``[:COUNT]`` may be left out; each name once."""
+    spans = [_parse_span(option, word, form, example) for word in words]
+    names = [span.name for span in spans]
+    if len(set(names)) < len(names):
+        raise at_odds(f"{option}: {', '.join(names)}: give each name once")
+    return spans
+
+
+def _parse_span(option: str, word: str, form: str, example: str) -> Span:
     name, equals, text = word.partition("=")
     parts, most = text.split(":"), form.count(":") + 1
     if not equals or not name.strip() or len(parts) not in (most, most - form.count("[")):
@@ -181,18 +131,7 @@ def parse_span(option: str, word: str, form: str, example: str) -> tuple[str, fl
     count = parts[2].strip() if len(parts) == 3 else None
     if count is not None and not (count.isdecimal() and 1 <= int(count) <= MOST_POINTS):
         raise off_range(f"{option} {word}: the count must be a whole number from 1 to {MOST_POINTS}, not {count!r}")
-    return name.strip(), low, high, None if count is None else int(count)
-
-
-def require_once(option: str, names: Sequence[str]) -> None:
-    """Refuse a name that several options of a kind give.
-
-    Raises
-    ------
-    UsageError
-    """
-    if len(set(names)) < len(names):
-        raise at_odds(f"{option}: {', '.join(names)}: give each name once")
+    return Span(name.strip(), low, high, None if count is None else int(count))
 
 
 # -- names and files ---------------------------------------------------------------------------------------------------
@@ -203,12 +142,10 @@ def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ..
     return tuple(name.strip() for text in value for name in text.split(",") if name.strip())
 
 
-def require_folder(option: str, file: Path | None) -> None:
+def require_folder(option: str, file: Path | None, exists: bool = False) -> None:
     """Fail before the work if a file cannot be written where it is asked for; makes nothing.
 
-    Raises
-    ------
-    UsageError
+    Its folder is made when it is written, unless it has to exist.
     """
     if file is None:
         return
@@ -223,31 +160,8 @@ def require_folder(option: str, file: Path | None) -> None:
         raise bad_file(f"{option} {file}: {folder} is a file, not a folder")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise bad_file(f"{option} {file}: the folder {folder} cannot be written")
-
-
-def require_document_folder(option: str, file: Path | None) -> None:
-    """Fail before the work if a text cannot be written where it is asked for: its folder has to be there.
-
-    Raises
-    ------
-    UsageError
-    """
-    require_folder(option, file)
-    if file is not None and not file.absolute().parent.is_dir():
-        raise bad_file(f"{option} {file}: there is no folder {file.absolute().parent}; make it, or name another one")
-
-
-# -- options -----------------------------------------------------------------------------------------------------------
-
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-end_option = click.option("--end", type=POSITIVE, metavar="T", help="End time in s.")
-
-
-def file_option(name: str, text: str, **attributes: Any) -> Decorator:
-    """An option that names a file."""
-    return click.option(name, type=click.Path(path_type=Path), metavar="FILE", help=text, **attributes)
+    if exists and folder != above[0]:
+        raise bad_file(f"{option} {file}: there is no folder {above[0]}; make it, or name another one")
 
 
 def _pair(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, float] | None:
@@ -272,147 +186,174 @@ def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) 
     raise click.BadParameter(f"no integrator {value!r}; there are {', '.join(SOLVERS)} (derivation: --method)")
 
 
-def _gathered(section: str, name: str, keys: dict[str, str], options: dict[str, dict[str, Any]]) -> Decorator:
-    """Options of a section; those that are set reach the verb in one mapping `name`, under `keys` or their names."""
+# -- options -----------------------------------------------------------------------------------------------------------
 
-    def decorate(verb: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(verb)
-        def wrapped(*args: Any, **kwargs: Any) -> Any:
-            values = {option.removeprefix("--").replace("-", "_"): None for option in options}
-            values = {key: kwargs.pop(key) for key in values}
-            gathered = {keys.get(key, key): x for key, x in values.items() if x not in (None, False, ())}
-            return verb(*args, **{name: gathered}, **kwargs)
+# What an annotation says beside its type: a type of click, or a call that converts the value. A text makes an option.
+Positive = Annotated[float, NumberRange(min=0, min_open=True)]
+Count = Annotated[int, click.IntRange(min=1)]
+Seed = Annotated[int, click.IntRange(min=0)]
+Texts = tuple[str, ...]
+Names = Annotated[Texts, split_names]
+TYPES = {float: Number(), Path: click.Path(path_type=Path), int: click.INT}
+Time = Annotated[float, "T: Time in s."]
+End = Annotated[Positive | None, "T: End time in s."]
 
-        for option, attributes in reversed(options.items()):
-            wrapped = shared_option(section, option, **attributes)(wrapped)
-        return wrapped
-
-    return decorate
-
-
-#: For ``simulate``, in one mapping ``solver``.
-solver_options = _gathered(
-    INTEGRATION, "solver", {"solver": "method"},
-    {
-        "--solver": {
-            "metavar": "NAME", "callback": _find_solver,
-            "help": "Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA; with --step RK4, moreau (rigid "
-            "contact).",
-        },
-        "--step": {"type": POSITIVE, "metavar": "H", "help": "Step size of RK4 and of moreau in s."},
-        "--rtol": {"type": POSITIVE, "metavar": "X", "help": "Relative tolerance of the integrator."},
-        "--atol": {"type": POSITIVE, "metavar": "X", "help": "Absolute tolerance of the integrator."},
-    },
-)  # fmt: skip
-_robot_options = _gathered(
-    ROBOTS, "robot", {},
-    {
-        "--floating": {"is_flag": True, "help": "The base moves freely (URDF)."},
-        "--lock": {
-            "multiple": True, "metavar": "JOINT[=VALUE]",
-            "help": "Fix a joint at a value (0 by default); repeat it for more.",
-        },
-        "--mimic": {
-            "type": click.Choice(["independent", "coupling"]),
-            "help": "Tie joints that mimic others by a coupling (the default), or leave them independent.",
-        },
-        "--rotation": {
-            "type": click.Choice(["euler_angles", "euler_parameters"]),
-            "help": "Describe free and ball joints by euler_angles or euler_parameters.",
-        },
-        "--actuate": {"is_flag": True, "help": "Add an input tau_<joint> to every joint of one degree of freedom."},
-        "--friction": {
-            "type": POSITIVE, "metavar": "VELOCITY",
-            "help": "Let the dry friction of joints act, smoothed below this velocity (rad/s or m/s).",
-        },
-        "--symbolic": {"is_flag": True, "help": "Make masses and inertias parameters."},
-        "--check-inertia": {
-            "type": click.Choice(["error", "note", "off"]),
-            "help": "Refuse masses and inertias that no body can have and motions without inertia, note them, or "
-            "accept them.",
-        },
-        "--limits": {
-            "type": click.Choice(["note", "stop", "off"]),
-            "help": "At the limits of joints: a run warns (note), elastic stops act (stop), or nothing happens (off).",
-        },
-        "--assets": {"metavar": "DIR", "help": "Folder in which other files may be read (MJCF)."},
-    },
-)  # fmt: skip
+OPTIONS = "Options"
+DERIVATION = "Derivation and compilation"
+#: Sections of the help of a verb: its own options, and those that many verbs share.
+SECTIONS = (OPTIONS, DERIVATION, "Integration", "Robot files (URDF, MJCF)")
+#: Names of the options at the end of the verb's own.
+LAST = ("--json", "--help")
+#: Options that are not called as their arguments.
+NAMES = {"settings": "--set", "ranges": "--range", "t": "--time", "form": "--format", "every": "--all"}
+NAMES |= {"as_json": "--json"}
 
 
-def target_option(*targets: str, default: str = "cython") -> Decorator:
-    """``--target`` with these choices."""
-    return shared_option(
-        DERIVATION,
-        "--target",
-        type=click.Choice(list(targets)),
-        default=default,
-        show_default=True,
-        help="; ".join(f"{target}: {TARGETS[target].about}" for target in targets) + ".",
-    )
+class Option(click.Option):
+    """The option of an argument, in a section of ``--help``; the text of its annotation may begin with ``METAVAR:``."""
+
+    def __init__(self, argument: str, hint: Any, default: Any, section: str = OPTIONS) -> None:
+        self.section = section
+        metavar, about = re.fullmatch("(?:([A-Z][A-Z=:|,[\\] ]*): )?(.*)", text_of(hint)).groups()  # type: ignore[union-attr]
+        attributes: dict[str, Any] = {"metavar": metavar, "help": about}
+        if default is Parameter.empty:
+            attributes["required"] = True
+        elif default is not None and default is not False and default != ():
+            attributes |= {"default": default, "show_default": True}
+        notes: list[Any] = []
+        while get_origin(hint) is Annotated or type(None) in get_args(hint):
+            hint, *more = get_args(hint)
+            notes += more
+        attributes["type"] = click.Choice(get_args(hint)) if get_origin(hint) is Literal else TYPES.get(hint)
+        for note in notes:
+            if isinstance(note, click.ParamType) or callable(note):
+                attributes["type" if isinstance(note, click.ParamType) else "callback"] = note
+        if hint is bool:
+            attributes["is_flag"] = True
+        elif get_origin(hint) is tuple:
+            attributes |= {"multiple": True} if ... in get_args(hint) else {"nargs": len(get_args(hint))}
+        super().__init__([NAMES.get(argument) or f"--{argument.replace('_', '-')}", argument], **attributes)
 
 
-#: Options of a model by what :class:`Source` calls them, in the order of ``--help``.
-_SOURCE: dict[str, Decorator] = {
-    "model": click.argument("model", metavar="MODEL", type=click.Path(path_type=Path)),
-    "allow_native": shared_option(
-        DERIVATION,
-        "--allow-native",
-        is_flag=True,
-        help="Compile and run the C (and Python) files that the model's native functions name; only for models you "
-        "trust.",
-    ),
-    "method": shared_option(
-        DERIVATION,
-        "--method",
-        default="auto",
-        show_default=True,
-        metavar="M",
-        help="Method of derivation: auto, embedding, lagrange, recursive, augmented, newton_euler, amalgamated, "
-        "gibbs_appell, hamilton (for the integrator see --solver of run).",
-    ),
-    "baumgarte": shared_option(
-        DERIVATION,
-        "--baumgarte",
-        metavar="ALPHA,BETA",
-        callback=_pair,
-        help="With --method augmented: stabilise constraints by C'' + 2 ALPHA C' + BETA^2 C = 0 (1/s) instead of "
-        "projecting.",
-    ),
-    "independent": shared_option(
-        DERIVATION,
-        "--independent",
-        multiple=True,
-        callback=split_names,
-        metavar="NAME",
-        help="Independent coordinate of a mechanism with loops; for several repeat it, or separate names by commas.",
-    ),
-    "target": target_option("cython", "numpy"),
-    "settings": click.option(
-        "--set",
-        "settings",
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="Value of a parameter, an input, a coordinate or a rate; repeat it for more.",
-    ),
-    "robot": _robot_options,
-}
+def text_of(hint: Any) -> str:
+    """The text of an option's annotation, empty of other arguments."""
+    return next((note for note in getattr(hint, "__metadata__", ()) if isinstance(note, str)), "")
 
 
-# -- models ------------------------------------------------------------------------------------------------------------
+@functools.cache
+def arguments(kind: Any) -> dict[str, tuple[Any, Any]]:
+    """Annotation and default of each argument of a function, or of a group of options."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {one.name: (hints[one.name], one.default) for one in signature(kind).parameters.values()}
 
 
-class Source(NamedTuple):
+def options_of(kind: Any, wanted: Sequence[str]) -> Iterator[Option]:
+    """The options of a function and of its groups, which are classes with a section; of :class:`Source` the wanted."""
+    section = getattr(kind, "SECTION", OPTIONS)
+    shared_last = sorted(arguments(kind).items(), key=lambda one: hasattr(one[1][0], "SECTION") and one[0] != "source")
+    for name, (hint, default) in shared_last:
+        group = Source if hint is Prepared else hint
+        if kind is Source and name not in wanted:
+            continue
+        if hasattr(group, "SECTION"):
+            yield from options_of(group, wanted)
+        elif text_of(hint):
+            yield Option(name, hint, default, OPTIONS if name == "settings" else section)
+
+
+def gather(kind: Any, values: dict[str, Any]) -> Any:
+    """A group of options, out of the values of all."""
+    groups = {name: gather(hint, values) for name, (hint, _) in arguments(kind).items() if hasattr(hint, "SECTION")}
+    return kind(**groups, **{name: values.pop(name) for name in arguments(kind) if name in values})
+
+
+def chosen(group: Any) -> dict[str, Any]:
+    """The options of a group that a command line sets."""
+    return {name: x for name, x in vars(group).items() if x not in (None, False, ())}
+
+
+@dataclass(frozen=True)
+class Integration:
+    """Options of ``simulate``."""
+
+    SECTION: ClassVar = "Integration"
+    solver: Annotated[
+        str | None,
+        _find_solver,
+        "NAME: Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA; with --step RK4, moreau (rigid contact).",
+    ] = None
+    step: Annotated[Positive | None, "H: Step size of RK4 and of moreau in s."] = None
+    rtol: Annotated[Positive | None, "X: Relative tolerance of the integrator."] = None
+    atol: Annotated[Positive | None, "X: Absolute tolerance of the integrator."] = None
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """The same as arguments of ``simulate``."""
+        return {{"solver": "method"}.get(name, name): value for name, value in chosen(self).items()}
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Options of robot files."""
+
+    SECTION: ClassVar = "Robot files (URDF, MJCF)"
+    floating: Annotated[bool, "The base moves freely (URDF)."] = False
+    lock: Annotated[Texts, "JOINT[=VALUE]: Fix a joint at a value (0 by default); repeat it for more."] = ()
+    mimic: Annotated[
+        Literal["independent", "coupling"] | None,
+        "Tie joints that mimic others by a coupling (the default), or leave them independent.",
+    ] = None
+    rotation: Annotated[
+        Literal["euler_angles", "euler_parameters"] | None,
+        "Describe free and ball joints by euler_angles or euler_parameters.",
+    ] = None
+    actuate: Annotated[bool, "Add an input tau_<joint> to every joint of one degree of freedom."] = False
+    friction: Annotated[
+        Positive | None, "VELOCITY: Let the dry friction of joints act, smoothed below this velocity (rad/s or m/s)."
+    ] = None
+    symbolic: Annotated[bool, "Make masses and inertias parameters."] = False
+    check_inertia: Annotated[
+        Literal["error", "note", "off"] | None,
+        "Refuse masses and inertias that no body can have and motions without inertia, note them, or accept them.",
+    ] = None
+    limits: Annotated[
+        Literal["note", "stop", "off"] | None,
+        "At the limits of joints: a run warns (note), elastic stops act (stop), or nothing happens (off).",
+    ] = None
+    assets: Annotated[str | None, "DIR: Folder in which other files may be read (MJCF)."] = None
+
+
+@dataclass(frozen=True)
+class Source:
     """A model file, and how it is derived and compiled."""
 
+    SECTION: ClassVar = DERIVATION
     model: Path
-    allow_native: bool = False
-    method: str = "auto"
-    baumgarte: tuple[float, float] | None = None
-    independent: tuple[str, ...] = ()
+    as_json: bool = False
+    allow_native: Annotated[
+        bool,
+        "Compile and run the C (and Python) files that the model's native functions name; only for models you trust.",
+    ] = False
+    method: Annotated[
+        str,
+        "M: Method of derivation: auto, embedding, lagrange, recursive, augmented, newton_euler, amalgamated, "
+        "gibbs_appell, hamilton (for the integrator see --solver of run).",
+    ] = "auto"
+    baumgarte: Annotated[
+        Any,
+        _pair,
+        "ALPHA,BETA: With --method augmented: stabilise constraints by C'' + 2 ALPHA C' + BETA^2 C = 0 (1/s) instead "
+        "of projecting.",
+    ] = None
+    independent: Annotated[
+        Names,
+        "NAME: Independent coordinate of a mechanism with loops; for several repeat it, or separate names by commas.",
+    ] = ()
     target: str = "cython"
-    settings: tuple[str, ...] = ()
-    robot: dict[str, Any] | None = None
+    settings: Annotated[
+        Texts, "NAME=VALUE: Value of a parameter, an input, a coordinate or a rate; repeat it for more."
+    ] = ()
+    robot: Robot = Robot()
 
     def load(self) -> Model:
         """The model; what an import of a robot left out is told on stderr."""
@@ -437,7 +378,7 @@ class Source(NamedTuple):
             before = set(equations.seconds)
             module = equations.compile(target=self.target)
             parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
-        return Prepared(equations, module, *_sort_settings(module, parse_settings(self.settings)))
+        return Prepared(self, equations, module, *_sort_settings(module, parse_settings(self.settings)))
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
@@ -450,10 +391,15 @@ class Source(NamedTuple):
                 raise ill_chosen("\n".join(problems)) from None
             raise
 
+    def show(self, values: Any, *parts: Result | ResultTable | str, files: Any = None) -> None:
+        """Print the values with --json, else the parts."""
+        show(self.as_json, values, *parts, files=files)
+
 
 class Prepared(NamedTuple):
     """A compiled model, and the values of ``--set``."""
 
+    source: Source
     equations: Equations
     module: Module
     initial: dict[str, float] | None
@@ -468,45 +414,86 @@ class Prepared(NamedTuple):
         """Initial values that are coordinates."""
         return {name: x for name, x in (self.initial or {}).items() if not name.endswith("_dot")} or None
 
-    def show(
-        self, as_json: bool, t: float, *parts: Result | ResultTable | str, values: Any = None, files: Any = None
-    ) -> None:
+    def show(self, t: float, *parts: Result | ResultTable | str, values: Any = None, files: Any = None) -> None:
         """Print what an analysis at a time found: its parts, or with --json the values, those of the result if none."""
-        from ..runtime.identity import origin
-
-        if not as_json:
+        if not self.source.as_json:
             show(False, {}, *parts, files=files)
             return
+        from ..runtime.identity import origin
+
         result = parts[0].to_dict() if values is None and isinstance(parts[0], Result) else values
         head = {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
         show(True, head | result, files=files)
 
 
-def model_verb(*names: str, target: Decorator | None = None) -> Callable[[Callable[..., Any]], Verb]:
-    """Make a function a verb that takes a :class:`Source` of these options as its first argument, and ``as_json``."""
+# -- verbs -------------------------------------------------------------------------------------------------------------
 
-    def decorate(verb: Callable[..., Any]) -> Verb:
-        @functools.wraps(verb)
-        def prepared(**values: Any) -> Any:
-            source = Source(**{name: values.pop(name) for name in Source._fields if name in values})
-            return verb(source, **values)
 
-        wrapped: Callable[..., Any] = json_option(reports_failures(prepared))
-        for name in reversed([name for name in _SOURCE if name in ("model", *names)]):
-            wrapped = (target if name == "target" and target else _SOURCE[name])(wrapped)
-        return click.command(cls=Verb)(wrapped)
+class Verb(click.Command):
+    """A command whose help has a section for each kind of options, and which knows other words for them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            names = {opt.lstrip("-"): opt for p in self.get_params(ctx) for opt in p.opts if opt.startswith("--")}
+            near = closest(error.option_name.lstrip("-"), names)
+            if not near:
+                raise
+            meant = f"No such option {error.option_name!r}; did you mean {names[near[0]]}?"
+            raise click.NoSuchOption(error.option_name, meant, ctx=ctx) from None
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        listed: dict[str, list[tuple[str, str]]] = {section: [] for section in SECTIONS}
+        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
+        for option in sorted(options, key=lambda p: LAST.index(p.opts[-1]) if p.opts[-1] in LAST else -1):
+            record = option.get_help_record(ctx)
+            if record is not None:
+                listed[getattr(option, "section", OPTIONS)].append(record)
+        for section, records in listed.items():
+            if records:
+                with formatter.section(section):
+                    formatter.write_dl(records)
+
+
+WANTED = ("settings", "allow_native", "method", "independent", "target", "robot")  #: of Source, by most verbs
+
+
+def verb(
+    wanted: Sequence[str] = WANTED, targets: Sequence[str] = ("cython", "numpy")
+) -> Callable[[Callable[..., Any]], Verb]:
+    """Make a function a verb, whose options are its arguments with a text, and those of its groups.
+
+    An argument of type :class:`Source` is a model file with the ``wanted`` options, one of type :class:`Prepared` the
+    same compiled, parameters and inputs bound.  The first of the ``targets`` is the default.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Verb:
+        hints = {name: hint for name, (hint, _) in arguments(function).items()}
+        source = bool({Source, Prepared} & {hint for hint in hints.values() if isinstance(hint, type)})
+
+        @functools.wraps(function)
+        def call(**values: Any) -> Any:
+            for name, hint in hints.items():
+                if hint is Prepared:
+                    values[name] = gather(Source, values).compile().bound()
+                elif hasattr(hint, "SECTION"):
+                    values[name] = gather(hint, values)
+            return function(**values)
+
+        params: list[click.Parameter] = list(options_of(function, wanted))
+        if source:
+            params.insert(0, click.Argument(["model"], metavar="MODEL", type=TYPES[Path]))
+        if "target" in (wanted if source else hints):
+            about = "; ".join(f"{target}: {TARGETS[target].about}" for target in targets)
+            params.append(Option("target", Annotated[Literal[tuple(targets)], f"{about}."], targets[0], DERIVATION))
+        params.append(Option("as_json", Annotated[bool, "Print one JSON object."], False))
+        return click.command(cls=Verb, params=params)(reports_failures(call))
 
     return decorate
 
 
-def analysis_verb(verb: Callable[..., Any]) -> Verb:
-    """Make a function a verb that takes a :class:`Prepared` with everything bound as its first argument."""
-
-    @functools.wraps(verb)
-    def compiled(source: Source, **values: Any) -> Any:
-        return verb(source.compile().bound(), **values)
-
-    return model_verb("allow_native", "method", "independent", "target", "settings", "robot")(compiled)
+# -- models ------------------------------------------------------------------------------------------------------------
 
 
 def _locked(text: tuple[str, ...]) -> dict[str, float]:
@@ -518,7 +505,7 @@ def _locked(text: tuple[str, ...]) -> dict[str, float]:
     return result
 
 
-def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | None = None) -> Model:
+def load_model(path: Path, allow_native: bool, robot: Robot) -> Model:
     """The model of a file, ``-`` for standard input.
 
     Raises
@@ -528,9 +515,9 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     ModelError
         The file is no model.
     """
-    options = dict(robot or {})
-    if "lock" in options:
-        options["lock"] = _locked(options["lock"])
+    options = chosen(robot)
+    if robot.lock:
+        options["lock"] = _locked(robot.lock)
     if allow_native:
         options["allow_native"] = True
     if str(path) == "-":
@@ -561,8 +548,6 @@ def _missing(path: Path) -> str:
         return f"{path} is {what}, not a plain file; " + (
             "name a model file in it" if path.is_dir() else "copy its content into a file"
         )
-    from ..base.files import example_files
-
     if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import click
 import numpy as np
 
 from ..base.files import save_figure
 from ..errors import MissingDependencyError, bad_file, incomplete
 from ..expr.notation import Notation
-from .options import split_names
+from .options import OPTIONS, Names
 
 if TYPE_CHECKING:
     from ..model.mechanism import Mechanism
@@ -53,12 +51,17 @@ def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
     return [(first, second) for first, second in pairs]
 
 
-class Picture(NamedTuple):
+@dataclass(frozen=True)
+class Picture:
     """What is to be drawn of a run: columns, over what, and of which kind."""
 
-    columns: tuple[str, ...] = ()
-    against: str | None = None
-    kind: str = "time"
+    SECTION: ClassVar = OPTIONS
+    columns: Annotated[Names, "NAME: Columns that --plot draws, separated by commas; all coordinates by default."] = ()
+    against: Annotated[str | None, "NAME: Column for the horizontal axis, instead of time."] = None
+    plot_as: Annotated[
+        Literal["time", "phase", "energy", "residuals", "spectrum"],
+        "What --plot draws: columns over time, phase portraits, energy, residuals or a spectrum.",
+    ] = "time"
 
 
 def check_picture(file: Path | None, picture: Picture) -> None:
@@ -90,36 +93,6 @@ def check_columns(module: Module, picture: Picture) -> None:
             raise unknown("column", name, known)
 
 
-def picture_options(verb: Callable[..., Any]) -> Callable[..., Any]:
-    """``--columns``, ``--against`` and ``--plot-as``, handed to the verb as one ``picture``."""
-
-    @functools.wraps(verb)
-    def wrapped(*args: Any, columns: tuple[str, ...], against: str | None, plot_as: str, **kwargs: Any) -> Any:
-        return verb(*args, picture=Picture(columns, against, plot_as), **kwargs)
-
-    for option in reversed(_PICTURE):
-        wrapped = option(wrapped)
-    return wrapped
-
-
-_PICTURE = (
-    click.option(
-        "--columns",
-        multiple=True,
-        callback=split_names,
-        metavar="NAME",
-        help="Columns that --plot draws, separated by commas; all coordinates by default.",
-    ),
-    click.option("--against", metavar="NAME", help="Column for the horizontal axis, instead of time."),
-    click.option(
-        "--plot-as",
-        type=click.Choice(["time", "phase", "energy", "residuals", "spectrum"]),
-        default="time",
-        help="What --plot draws: columns over time, phase portraits, energy, residuals or a spectrum.",
-    ),
-)
-
-
 def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, file: Path, picture: Picture) -> None:
     """Draw a run or a kinematic analysis and write the picture; the suffix of ``file`` says its format.
 
@@ -144,7 +117,7 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
     names = picture.columns
     if own:
         names = tuple(n for n in (*trajectory.metadata["q_names"], *trajectory.metadata["loop_names"]) if n != over)
-    panels, across = choose(trajectory, names, over, None, picture.kind)
+    panels, across = choose(trajectory, names, over, None, picture.plot_as)
     paths = paths if own else []
     size = (8.2 + 4.4 * bool(paths), max(3.2, sum(map(height, panels)) + 0.9))
     figure = Figure(figsize=size, layout="constrained", dpi=120)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import numpy as np
 
 from ..analysis.linearization import without_noise
@@ -16,20 +15,9 @@ from ..base.results import ResultTable
 from ..errors import ModelError, ToolchainError, at_odds, bad_file, ill_shaped, incomplete
 from ..runtime.storage import RUNS
 from .models import operations_of, summary
-from .options import (
-    POSITIVE,
-    Source,
-    end_option,
-    file_option,
-    model_verb,
-    parse_span,
-    require_folder,
-    require_once,
-    solver_options,
-    split_names,
-)
-from .output import after_integration, say, show, stage
-from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
+from .options import WANTED, End, Integration, Names, Positive, Source, Span, Texts, parse_spans, require_folder, verb
+from .output import after_integration, say, stage
+from .plot import Picture, check_columns, check_picture, find_paths, plot_run
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
@@ -38,6 +26,8 @@ if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
     from .energy import EnergyBalance
 
+#: Options of a model whose positions alone matter.
+POSITIONS = ("settings", "allow_native", "independent", "target")
 POINTS = 5  #: change points listed
 #: What a run with rigid contacts tells of them.
 CONTACT = ("contacts", "contact_iterations", "contact_residual", "missed_steps", "penetration")
@@ -45,17 +35,16 @@ CONTACT = ("contacts", "contact_iterations", "contact_residual", "missed_steps",
 # -- run ---------------------------------------------------------------------------------------------------------------
 
 
-@model_verb("allow_native", "method", "baumgarte", "independent", "target", "settings", "robot")
-@end_option
-@file_option("--out", "Write the run to FILE.npz, .csv, .nc or .parquet.")
-@file_option("--plot", "Draw the run, e.g. to FILE.png.")
-@file_option("--animate", "Write an animation: FILE.gif, FILE.mp4 or FILE.html.")
-@picture_options
-@solver_options
+@verb((*WANTED, "baumgarte"))
 def run(
-    source: Source, end: float | None, out: Path | None, plot: Path | None, picture: Picture, animate: Path | None,
-    as_json: bool, solver: dict[str, Any],
-) -> None:  # fmt: skip
+    source: Source,
+    picture: Picture,
+    solver: Integration,
+    end: End = None,
+    out: Annotated[Path | None, "FILE: Write the run to FILE.npz, .csv, .nc or .parquet."] = None,
+    plot: Annotated[Path | None, "FILE: Draw the run, e.g. to FILE.png."] = None,
+    animate: Annotated[Path | None, "FILE: Write an animation: FILE.gif, FILE.mp4 or FILE.html."] = None,
+) -> None:
     """Derive, compile and simulate a model, and report the run.
 
     Integrator, tolerances, end time and initial values are those of the model file unless an option sets them.
@@ -78,9 +67,9 @@ def run(
             initial=work.initial,
             parameters=work.parameters,
             inputs=work.inputs,
-            dense_output=not takes_impulses(module, solver)
+            dense_output=not takes_impulses(module, solver.keywords)
             and (plot is not None or animate is not None or counts_work(equations)),
-            **solver,
+            **solver.keywords,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
     with after_integration():
@@ -92,7 +81,7 @@ def run(
         values = _run_to_dict(equations, trajectory, energy) | {"seconds": seconds}
         uncounted = uncounted_functions(equations) if energy and energy.work is None else ()
         tables = tables_of(trajectory, energy, uncounted)
-    show(as_json, values, str(equations.report), *operations_of(equations), *tables, files=files)
+    source.show(values, str(equations.report), *operations_of(equations), *tables, files=files)
 
 
 def _check_files(out: Path | None, plot: Path | None, picture: Picture) -> None:
@@ -226,28 +215,25 @@ COUNT = 201  #: points of a range unless it says
 SHOWN = 9  #: of them on the screen
 
 
-@model_verb("allow_native", "independent", "target", "settings")
-@click.option(
-    "--range",
-    "ranges",
-    multiple=True,
-    metavar="NAME=START:END[:COUNT]",
-    help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must have the same count.",
-)
-@click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can move from the start.")
-@click.option("--partial", is_flag=True, help="If the range cannot be reached completely, return the part that can.")
-@file_option("--out", "Write all columns to FILE.npz, .csv, .nc or .parquet.")
-@file_option("--plot", "Draw them, e.g. to FILE.png.")
-@picture_options
+@verb(POSITIONS)
 def kinematics(
-    source: Source, ranges: tuple[str, ...], limits: tuple[str, ...], partial: bool, out: Path | None,
-    plot: Path | None, picture: Picture, as_json: bool,
-) -> None:  # fmt: skip
+    source: Source,
+    picture: Picture,
+    ranges: Annotated[
+        Texts,
+        "NAME=START:END[:COUNT]: Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must "
+        "have the same count.",
+    ] = (),
+    limits: Annotated[Texts, "NAME: Find how far a coordinate can move from the start."] = (),
+    partial: Annotated[bool, "If the range cannot be reached completely, return the part that can."] = False,
+    out: Annotated[Path | None, "FILE: Write all columns to FILE.npz, .csv, .nc or .parquet."] = None,
+    plot: Annotated[Path | None, "FILE: Draw them, e.g. to FILE.png."] = None,
+) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
 
     Without --range, drivers move the model from t = 0 to the end given in its file.
     """
-    requested = [_read_range(text) for text in ranges]
+    requested = parse_spans("--range", ranges, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
     _check_files(out, plot, picture)
     work = source.compile("embedding")
     equations, module = work.equations, work.bound().module
@@ -265,22 +251,16 @@ def kinematics(
         *([] if motion is None else _tables_of_motion(motion)),
         *(ResultTable((), r.facts, r.title) for r in result),
     ]
-    show(as_json, values, str(equations.report), *tables, files=files)
+    source.show(values, str(equations.report), *tables, files=files)
 
 
-def _read_range(text: str) -> tuple[str, float, float, int | None]:
-    return parse_span("--range", text, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
-
-
-def _range_values(module: Module, requested: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+def _range_values(module: Module, requested: list[Span]) -> dict[str, Any]:
     """Arrays over the ranges asked for, by name; of the time where drivers leave nothing free."""
     if not requested:
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
             raise incomplete(f"give --range: {_left(module.n_dof)}, for example of {free}")
-        requested = [("t", 0.0, float(module.info.simulation.get("end") or 10.0), None)]
-    names = [name for name, *_ in requested]
-    require_once("--range", names)
+        requested = [Span("t", 0.0, float(module.info.simulation.get("end") or 10.0), None)]
     counts = {count for *_, count in requested if count is not None} or {COUNT}
     if len(counts) > 1:
         raise ill_shaped(f"--range: the counts {', '.join(map(str, sorted(counts)))} must be equal")
@@ -332,26 +312,24 @@ def _tables_of_motion(motion: KinematicAnalysis) -> tuple[ResultTable, ResultTab
 # -- view --------------------------------------------------------------------------------------------------------------
 
 
-@model_verb("allow_native", "independent", "target", "settings", "robot")
-@click.option(
-    "--range",
-    "ranges",
-    multiple=True,
-    metavar="NAME=START:END[:COUNT]",
-    help="Move a coordinate over a range without forces, e.g. theta=0:2*pi; t for drivers.",
-)
-@end_option
-@file_option("--out", "Write FILE.html, .gif, .mp4, or a folder of PNG frames, instead of opening a browser.")
-@click.option("--trace", multiple=True, callback=split_names, metavar="MARKER", help="Draw the path of a marker.")
-@click.option("--plot", multiple=True, callback=split_names, metavar="NAME", help="Draw columns along the animation.")
-@click.option("--forces", is_flag=True, help="Draw arrows of the forces in the joints.")
-@click.option("--speed", type=POSITIVE, metavar="X", help="Seconds of motion shown in one second.")
-@click.option("--fps", type=POSITIVE, metavar="N", help="Frames in one second; 25 by default.")
-@solver_options
+@verb((*POSITIONS, "robot"))
 def view(
-    source: Source, ranges: tuple[str, ...], end: float | None, out: Path | None, trace: tuple[str, ...],
-    plot: tuple[str, ...], forces: bool, speed: float | None, fps: float | None, as_json: bool, solver: dict[str, Any],
-) -> None:  # fmt: skip
+    source: Source,
+    solver: Integration,
+    ranges: Annotated[
+        Texts,
+        "NAME=START:END[:COUNT]: Move a coordinate over a range without forces, e.g. theta=0:2*pi; t for drivers.",
+    ] = (),
+    end: End = None,
+    out: Annotated[
+        Path | None, "FILE: Write FILE.html, .gif, .mp4, or a folder of PNG frames, instead of opening a browser."
+    ] = None,
+    trace: Annotated[Names, "MARKER: Draw the path of a marker."] = (),
+    plot: Annotated[Names, "NAME: Draw columns along the animation."] = (),
+    forces: Annotated[bool, "Draw arrows of the forces in the joints."] = False,
+    speed: Annotated[Positive | None, "X: Seconds of motion shown in one second."] = None,
+    fps: Annotated[Positive | None, "N: Frames in one second; 25 by default."] = None,
+) -> None:
     """Show how a mechanism moves: over a range of its coordinates, or in a run.
 
     Without --out a browser opens a page in the folder of temporary files, which needs no network.  With a compiler for
@@ -363,8 +341,8 @@ def view(
 
     from ..show.writers import require_kind
 
-    requested = [_read_range(text) for text in ranges]
-    if requested and (end is not None or solver):
+    requested = parse_spans("--range", ranges, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
+    if requested and (end is not None or solver.keywords):
         raise at_odds("--range moves the model without forces; leave out --end and options of the integrator")
     if any(count == 1 for *_, count in requested):
         raise incomplete("an animation needs two positions: give --range a COUNT of at least 2")
@@ -378,17 +356,15 @@ def view(
             motion: Any = module.kinematic_analysis(initial=work.initial, **values)
     else:
         with stage("simulate"):
-            motion = work.module.simulate(
-                end, initial=work.initial, parameters=work.parameters, inputs=work.inputs, **solver
-            )
+            motion = work.module.simulate(end, work.initial, work.parameters, work.inputs, **solver.keywords)
     look = {key: value for key, value in (("speed", speed), ("fps", fps)) if value is not None}
     with after_integration(), stage("animate"):
         film = requested or trace or plot or forces or look or work.inputs or file.suffix != ".html"
         written = None if film else _live_page(work.bound().module, motion, file)
         written = written or motion.animate(file, trace=trace, plot=plot, forces=forces, **look)
     opened = out is None and webbrowser.open(Path(written).absolute().as_uri())
-    show(as_json, {"name": work.module.name, "points": len(motion), "opened": opened}, files=[written])
-    if not as_json and out is None and not opened:
+    source.show({"name": work.module.name, "points": len(motion), "opened": opened}, files=[written])
+    if not source.as_json and out is None and not opened:
         say("no browser was found; open that file in a browser, or give --out FILE")
 
 
