@@ -19,26 +19,7 @@ if TYPE_CHECKING:
     from .api.loading import load_example as load_example
     from .api.model import Model as Model
     from .api.model import from_sympy as from_sympy
-    from .errors import AssemblyError as AssemblyError
-    from .errors import EomgenError as EomgenError
-    from .errors import EquilibriumError as EquilibriumError
-    from .errors import EvaluationError as EvaluationError
-    from .errors import ExpressionError as ExpressionError
-    from .errors import MissingDependencyError as MissingDependencyError
-    from .errors import ModelError as ModelError
-    from .errors import NoDerivativeError as NoDerivativeError
-    from .errors import NonFiniteError as NonFiniteError
-    from .errors import ParameterError as ParameterError
-    from .errors import PartitionError as PartitionError
-    from .errors import ProjectionError as ProjectionError
-    from .errors import SimulationError as SimulationError
-    from .errors import SimulationInterrupted as SimulationInterrupted
-    from .errors import SingularMassMatrixError as SingularMassMatrixError
-    from .errors import ToolchainError as ToolchainError
-    from .errors import UnavailableError as UnavailableError
-    from .errors import UnsolvedError as UnsolvedError
-    from .errors import UsageError as UsageError
-    from .errors import ZenoError as ZenoError
+    from .errors import *  # noqa: F403
     from .module import Module as Module
     from .runtime.inputs import Signal as Signal
     from .runtime.trajectory import Trajectory as Trajectory
@@ -54,26 +35,10 @@ _HOMES |= _TYPES
 _MODULES = {"errors": ".errors", "rotations": ".elements.rotations"}
 _HOMES |= {"Signal": "runtime.inputs", "load_trajectory": "runtime.trajectory"}
 _ERRORS = (
-    "AssemblyError",
-    "EomgenError",
-    "EquilibriumError",
-    "EvaluationError",
-    "ExpressionError",
-    "MissingDependencyError",
-    "ModelError",
-    "NoDerivativeError",
-    "NonFiniteError",
-    "ParameterError",
-    "PartitionError",
-    "ProjectionError",
-    "SimulationError",
-    "SimulationInterrupted",
-    "SingularMassMatrixError",
-    "ToolchainError",
-    "UnavailableError",
-    "UnsolvedError",
-    "UsageError",
-    "ZenoError",
+    *("AssemblyError", "EomgenError", "EquilibriumError", "EvaluationError", "ExpressionError"),
+    *("MissingDependencyError", "ModelError", "NoDerivativeError", "NonFiniteError", "ParameterError"),
+    *("PartitionError", "ProjectionError", "SimulationError", "SimulationInterrupted", "SingularMassMatrixError"),
+    *("ToolchainError", "UnavailableError", "UnsolvedError", "UsageError", "ZenoError"),
 )
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
 

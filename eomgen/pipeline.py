@@ -36,46 +36,13 @@ if TYPE_CHECKING:
 
 
 def derive(
-    model: Builder,
-    method: str = "auto",
-    independent: Sequence[str] | None = None,
-    baumgarte: tuple[float, float] | None = None,
-) -> Derivation:
-    """Derive the equations of motion of a model.
-
-    Parameters
-    ----------
-    model : Model
-    method : str
-        One of ``equations.METHODS``, or ``auto``: embedding or recursive, whichever has the right-hand side of fewer
-        operations; lagrange of a bare Lagrangian.
-    independent : names of coordinates or velocities, optional
-        Independent ones of a mechanism with loops; the model's own by default.  The best conditioned others join them
-        where they are fewer than the degrees of freedom.
-    baumgarte : (alpha, beta), optional
-        Of the augmented form (1/s): C'' + 2 alpha C' + beta^2 C = 0 holds instead of C'' = 0, and the right-hand side
-        does not project its states.
-
-    Raises
-    ------
-    ModelError
-        Every fault of the description at once.
-    AssemblyError
-        The loops do not close at the declared initial values.
-    UsageError
-        No such method.
-    """
-    return derive_as(Derivation, model, method, independent, baumgarte)
-
-
-def derive_as(
     kind: type[Derived],
     model: Builder,
     method: str = "auto",
     independent: Sequence[str] | None = None,
     baumgarte: tuple[float, float] | None = None,
 ) -> Derived:
-    """The same as a result of another type."""
+    """Stages 1 to 3, Model -> this type of Derivation; see :meth:`eomgen.api.model.Model.derive`."""
     start = perf_counter()
     with without_gc(), np.errstate(all="ignore"):
         mechanism = model.mechanism()

@@ -11,11 +11,11 @@ from ..errors import AssemblyError, EomgenError, ModelError, UsageError
 from ..mechanics.methods.positive import note_lost_digits, require_inertia
 from ..mechanics.report import MechanismReport, other_branches, report
 from ..pipeline import compile_core, derive
+from ..reading.derivation import Derivation
 from ..runtime.bound_model import BoundModel
 
 if TYPE_CHECKING:
     from ..model.model import Builder
-    from ..reading.derivation import Derivation
 
 #: Functions that the assembly of a state calls, and those for values of outputs and markers.
 OF_STARTS = (
@@ -33,21 +33,15 @@ def check(model: Builder) -> MechanismReport:
     ------
     ModelError, AssemblyError
     """
-    equations = derive(model)
+    equations = derive(Derivation, model)
     equations.kinematics.mechanism.require_values()
     unbalanced = require_inertia(equations.kinematics, equations.mobility, equations.tree)
     result = report(equations.kinematics, equations.mobility)
     note = note_lost_digits(equations.kinematics, equations.mobility, equations.tree)
-    more = (
-        [f"kinematics only (no masses, so no equations of motion): {unbalanced}"]
-        if unbalanced
-        else [note]
-        if note
-        else []
-    )
-    more += _assemble_start(equations)
-    others = other_branches(equations.kinematics, equations.mobility)
-    return replace(result, notes=[*result.notes, *more], other_branches=others)
+    if unbalanced:
+        note = f"kinematics only (no masses, so no equations of motion): {unbalanced}"
+    notes = [*result.notes, *([note] if note else []), *_assemble_start(equations)]
+    return replace(result, notes=notes, other_branches=other_branches(equations.kinematics, equations.mobility))
 
 
 def _assemble_start(equations: Derivation) -> list[str]:

@@ -14,7 +14,6 @@ from ..runtime.argument_checks import find_lacking
 
 if TYPE_CHECKING:
     from ..explain import Explanation
-    from ..model.model import Builder
     from ..runtime.device.cuda_device import Device
     from ..runtime.device.device_module import DeviceModule
     from ..toolchain.compiler import BuildOptions
@@ -220,13 +219,3 @@ class Equations(Derivation):
 
         program = pipeline.build(self, "fmu")
         return write_fmu(program, BoundModel(pipeline.compile_core(self, "numpy")), path, version)
-
-
-def derive(
-    model: Builder,
-    method: str = "auto",
-    independent: Sequence[str] | None = None,
-    baumgarte: tuple[float, float] | None = None,
-) -> Equations:
-    """Derive the equations of motion of a model; see :func:`eomgen.pipeline.derive`."""
-    return pipeline.derive_as(Equations, model, method, independent, baumgarte)

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.files import as_path
 from ..codegen.package import emit_package, write_package
 from ..errors import EomgenError, cannot
-from ..pipeline import build, compile_core, derive_as, with_start
+from ..pipeline import build, compile_core, derive, with_start
 from ..runtime.bound_model import BoundModel
 from ..toolchain.targets import find_function, find_target
 from ..verify.random_states import RECORDED, record_calls
@@ -67,7 +67,7 @@ def generate(
             f"target {target!r} works only in a session, by compile(target={target!r}); for a machine without a "
             "compiler generate a wheel: --target cython --wheel, or eomgen.toolchain.wheel.build_wheel(folder)"
         )
-    equations = derive_as(Equations, model, method, independent, baumgarte)
+    equations = derive(Equations, model, method, independent, baumgarte)
     if row.whole:
         if precision != "double":
             raise cannot(f"precision is for packages; target {target} makes one file")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Unpack
 from ..base.results import picture_html, side_by_side
 from ..errors import too_large
 from ..model.model import Builder
+from ..pipeline import derive
 from ..runtime.runs.bound_run import waiting
-from .equations import Equations, derive
+from .equations import Equations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,8 +108,30 @@ class Model(Builder):
         independent: Sequence[Any] | None = None,
         baumgarte: tuple[float, float] | None = None,
     ) -> Equations:
-        """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
-        return derive(self, method, independent, baumgarte)
+        """Derive the equations of motion.
+
+        Parameters
+        ----------
+        method : str
+            One of ``eomgen.mechanics.methods.METHODS``, or ``auto``: embedding or recursive, whichever has the
+            right-hand side of fewer operations; lagrange of a bare Lagrangian.
+        independent : names of coordinates or velocities, optional
+            Independent ones of a mechanism with loops; the model's own by default.  The best conditioned others join
+            them where they are fewer than the degrees of freedom.
+        baumgarte : (alpha, beta), optional
+            Of the augmented form (1/s): C'' + 2 alpha C' + beta^2 C = 0 holds instead of C'' = 0, and the right-hand
+            side does not project its states.
+
+        Raises
+        ------
+        ModelError
+            Every fault of the description at once.
+        AssemblyError
+            The loops do not close at the declared initial values.
+        UsageError
+            No such method.
+        """
+        return derive(Equations, self, method, independent, baumgarte)
 
     def compile(
         self,

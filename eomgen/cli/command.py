@@ -16,40 +16,29 @@ from ..base.texts import visible
 from ..errors import UsageError
 from .output import USAGE, name_options, print_json, to_dict
 
-#: verb -> what it does.
+#: Verb -> the file of this folder in which it is a command of the same name, and what it does.
 VERBS = {
-    "run": "Derive, compile and simulate a model.",
-    "ensemble": "Run a model many times with different values.",
-    "view": "Show how a mechanism moves, in a browser or as a file.",
-    "kinematics": "Analyse the motion over a range, without forces.",
-    "check": "Report a model's topology, mobility and errors.",
-    "derive": "Derive the equations of motion and count their operations.",
-    "explain": "Write the worked solution: every step to the equations, then numbers.",
-    "linearize": "Linearize a model: A, B, C, D, eigenvalues.",
-    "modes": "Find natural frequencies, mode shapes and damping ratios.",
-    "equilibrium": "Find a static equilibrium, or parameters that balance a position.",
-    "sensitivity": "Differentiate a run by parameters, inputs and initial values.",
-    "consistent": "Find the consistent state nearest to a rough one.",
-    "reactions": "Find forces and moments in all joints.",
-    "inverse": "Find the forces of drives that produce a motion.",
-    "impact": "Find the state after an impact, its impulses and energy loss.",
-    "verify": "Check a compiled model against independent computations.",
-    "generate": "Write a package that needs no eomgen.",
-    "convert": "Write a robot (URDF, MJCF) as a model file.",
-    "examples": "List the example models, copy one here, or run them all.",
-    "doctor": "Check that this installation can derive, compile and simulate.",
-    "cache": "List, prune or clear the compiled modules.",
-}
-#: File of this folder -> its verbs, commands of the same name.
-FILES = {
-    "runs": ("run", "view", "kinematics"),
-    "ensembles": ("ensemble",),
-    "models": ("check", "derive", "explain", "generate", "convert"),
-    "analyses": (
-        *("linearize", "modes", "equilibrium", "sensitivity", "consistent"),
-        *("reactions", "inverse", "impact", "verify"),
-    ),
-    "installation": ("examples", "doctor", "cache"),
+    "run": ("runs", "Derive, compile and simulate a model."),
+    "ensemble": ("ensembles", "Run a model many times with different values."),
+    "view": ("runs", "Show how a mechanism moves, in a browser or as a file."),
+    "kinematics": ("runs", "Analyse the motion over a range, without forces."),
+    "check": ("models", "Report a model's topology, mobility and errors."),
+    "derive": ("models", "Derive the equations of motion and count their operations."),
+    "explain": ("models", "Write the worked solution: every step to the equations, then numbers."),
+    "linearize": ("analyses", "Linearize a model: A, B, C, D, eigenvalues."),
+    "modes": ("analyses", "Find natural frequencies, mode shapes and damping ratios."),
+    "equilibrium": ("analyses", "Find a static equilibrium, or parameters that balance a position."),
+    "sensitivity": ("analyses", "Differentiate a run by parameters, inputs and initial values."),
+    "consistent": ("analyses", "Find the consistent state nearest to a rough one."),
+    "reactions": ("analyses", "Find forces and moments in all joints."),
+    "inverse": ("analyses", "Find the forces of drives that produce a motion."),
+    "impact": ("analyses", "Find the state after an impact, its impulses and energy loss."),
+    "verify": ("analyses", "Check a compiled model against independent computations."),
+    "generate": ("models", "Write a package that needs no eomgen."),
+    "convert": ("models", "Write a robot (URDF, MJCF) as a model file."),
+    "examples": ("installation", "List the example models, copy one here, or run them all."),
+    "doctor": ("installation", "Check that this installation can derive, compile and simulate."),
+    "cache": ("installation", "List, prune or clear the compiled modules."),
 }
 
 
@@ -62,8 +51,7 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
             return None
-        home = next(file for file, verbs in FILES.items() if cmd_name in verbs)
-        command: click.Command = getattr(import_module(f".{home}", __package__), cmd_name)
+        command: click.Command = getattr(import_module(f".{VERBS[cmd_name][0]}", __package__), cmd_name)
         return command
 
     def resolve_command(
@@ -76,7 +64,7 @@ class Verbs(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Verbs"):
-            formatter.write_dl(list(VERBS.items()))
+            formatter.write_dl([(name, about) for name, (_, about) in VERBS.items()])
 
 
 def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,6 @@ from ..expr.evaluate import evaluate
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
-    from ..mechanics import Kinematics
-    from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
 
 MOREAU = "moreau"
@@ -34,98 +31,77 @@ class EnergyBalance(NamedTuple):
     jumps: float  #: what impacts and other resets added to it at their instants, losses negative
 
 
-def balance_energy(equations: Equations, trajectory: Trajectory) -> EnergyBalance | None:
-    """Hold the energy of a run against the work done on it.
+class Power:
+    """Power (W) of all that has no potential in a model's force elements: wrench . twist at their markers.
 
-    Parameters
+    Attributes
     ----------
-    equations : Equations
-    trajectory : Trajectory
-        With dense output where :func:`counts_work` says so.
+    uncounted : list of str
+        Functions that it depends on and that NumPy cannot evaluate: the work of such a run is not known.
+    counts : bool
+        Whether the work of a run is summed between its steps: something does work, and all of it is known.
+    """
 
-    Returns
-    -------
-    EnergyBalance
-        None where the model does not know its energy.
+    def __init__(self, equations: Equations) -> None:
+        kinematics = equations.kinematics
+        motion, power = kinematics.motion, kinematics.graph.zero
+        for terms in kinematics.forces:
+            for load in terms.marker_remainder:  # in ground axes
+                power = power + vec.dot(load.force, motion.velocity(load.marker))
+                power = power + vec.dot(load.torque, motion.angular_velocity(load.marker))
+            for along in terms.coordinate_remainder:
+                power = power + along.value * motion.coordinate(along.coordinate)[1]
+        self.kinematics, self.expression = kinematics, kinematics.resolve([power])[0]
+        self.uncounted = _without_fallback(self.expression)
+        # constraints that move do work of their own
+        self.all = not kinematics.mechanism.bare and all(e.is_zero for e in kinematics.constraints.time_derivative)
+        self.counts = self.all and not self.expression.is_zero and not self.uncounted
+
+    def work(self, trajectory: Trajectory) -> NDArray[np.float64] | None:
+        """Work done up to each time (n_t,), by Gauss's quadrature over each step; None if not known."""
+        if not self.all or trajectory.metadata["method"] == MOREAU:
+            return None
+        values = dict(trajectory.metadata["parameters"])
+        graph, names = self.kinematics.graph, self.kinematics.input_names
+        constant = {
+            graph.symbol(u): graph.constant(float(trajectory[u][0])) for u in names if not np.ptp(trajectory[u])
+        }
+        power = substitute([self.expression], constant)[0]
+        if power.is_zero:
+            return np.zeros(len(trajectory.t))
+        if _without_fallback(power):
+            return None
+        nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+        start, step = trajectory.t[:-1, None], np.diff(trajectory.t)[:, None]
+        times = (start + step * (nodes + 1.0) / 2.0).ravel()
+        between = trajectory.at(times)
+        values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True))}
+        values |= {u: between[u] for u in names}
+        watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
+        return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
+
+
+def balance_energy(power: Power, trajectory: Trajectory) -> EnergyBalance | None:
+    """Hold the energy of a run against the work done on it; None where the model does not know its energy.
+
+    The run has dense output where the power ``counts``.
     """
     if not trajectory.has_energies:
         return None
     T, _, energy = trajectory.energies
-    largest = float(np.abs(T).max())
-    work = None if trajectory.metadata["method"] == MOREAU else _work(equations.kinematics, trajectory)
+    largest, work = float(np.abs(T).max()), power.work(trajectory)
     at_once = np.where(np.diff(trajectory.t) == 0.0, np.diff(energy), 0.0)  # before and after a reset
     jumps = np.concatenate([[0.0], np.cumsum(at_once)])
     balance = None
     if work is not None and largest:
         balance = float(np.abs(energy - energy[0] - work - jumps).max()) / largest
-    return EnergyBalance(
-        float(energy[0]),
-        float(energy[-1]),
-        None if work is None else float(work[-1]),
-        trajectory.energy_drift,
-        balance,
-        float(jumps[-1]),
-    )
-
-
-def _work(kinematics: Kinematics, trajectory: Trajectory) -> NDArray[np.float64] | None:
-    """Work done up to each time (n_t,), by Gauss's quadrature of the power over each step; None if not known."""
-    if kinematics.mechanism.bare or not all(e.is_zero for e in kinematics.constraints.time_derivative):
-        return None  # constraints that move do work of their own
-    values = dict(trajectory.metadata["parameters"])
-    graph, names = kinematics.graph, kinematics.input_names
-    held = {u: float(trajectory[u][0]) for u in names if not np.ptp(trajectory[u])}
-    power = substitute([_power(kinematics)], {graph.symbol(u): graph.constant(value) for u, value in held.items()})[0]
-    if power.is_zero:
-        return np.zeros(len(trajectory.t))
-    if _without_fallback(power):
-        return None
-    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
-    start, step = trajectory.t[:-1, None], np.diff(trajectory.t)[:, None]
-    times = (start + step * (nodes + 1.0) / 2.0).ravel()
-    between = trajectory.at(times)
-    values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True)), **{u: between[u] for u in names}}
-    watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
-    return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
-
-
-def takes_impulses(module: BoundModel, options: Mapping[str, Any]) -> bool:
-    """Whether a run is one of method moreau, in which impulses of contacts do work at their instants."""
-    return bool(options.get("method", module.info.simulation["method"]) == MOREAU)
-
-
-def counts_work(equations: Equations) -> bool:
-    """Whether the work of a run is summed between its steps: something without a potential does work that is known."""
-    kinematics = equations.kinematics
-    if kinematics.mechanism.bare or not all(e.is_zero for e in kinematics.constraints.time_derivative):
-        return False
-    power = _power(kinematics)
-    return not power.is_zero and not _without_fallback(power)
-
-
-def uncounted_functions(equations: Equations) -> list[str]:
-    """Functions that the power depends on and that NumPy cannot evaluate: the work of such a run is not known."""
-    return _without_fallback(_power(equations.kinematics))
+    done = None if work is None else float(work[-1])
+    return EnergyBalance(float(energy[0]), float(energy[-1]), done, trajectory.energy_drift, balance, float(jumps[-1]))
 
 
 def _without_fallback(power: Expr) -> list[str]:
+    """Functions that NumPy cannot evaluate, as it can sums over pairs of shapes."""
     graph = power.graph
-    called = {graph.nodes[i][0] for i in reachable(graph, [power.id])} & graph.calls.keys()
-    return sorted({function.name for function, _ in (graph.calls[key] for key in called) if _lacks_fallback(function)})
-
-
-def _lacks_fallback(function: object) -> bool:
-    """Whether NumPy cannot evaluate a function, as it can sums over pairs of shapes."""
-    return not isinstance(function, PairCall) and getattr(function, "evaluator", None) is None
-
-
-def _power(kinematics: Kinematics) -> Expr:
-    """Power (W) of all that has no potential in force elements: wrench . twist at their markers, in ground axes."""
-    motion, power = kinematics.motion, kinematics.graph.zero
-    for terms in kinematics.forces:
-        for load in terms.marker_remainder:
-            power = power + vec.dot(load.force, motion.velocity(load.marker))
-            power = power + vec.dot(load.torque, motion.angular_velocity(load.marker))
-        for along in terms.coordinate_remainder:
-            power = power + along.value * motion.coordinate(along.coordinate)[1]
-    return kinematics.resolve([power])[0]
+    kinds = {graph.nodes[i][0] for i in reachable(graph, [power.id])}
+    called = (function for kind, (function, _) in graph.calls.items() if kind in kinds)
+    return sorted({f.name for f in called if not isinstance(f, PairCall) and getattr(f, "evaluator", None) is None})

@@ -11,7 +11,6 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module, metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
@@ -140,13 +139,13 @@ def _compiler() -> Iterator[Check]:
 def _compiles() -> Check:
     """Compile the shipped pendulum afresh and compare one call with the closed form."""
     from math import sin
-    from time import perf_counter
+    from unittest.mock import patch
 
     from ..api.loading import load
 
     start = perf_counter()
     try:
-        with _fresh_cache():
+        with TemporaryDirectory(prefix="eomgen-doctor-") as folder, patch.dict(os.environ, EOMGEN_CACHE_DIR=folder):
             module = load(shipped("examples") / "pendulum.yaml").compile()
             acceleration = float(module.rhs(0.0, [0.5, 0.0])[1])
     except Exception as error:  # a package that cannot be imported too
@@ -157,20 +156,6 @@ def _compiles() -> Check:
             "small model", False, f"wrong acceleration of a pendulum: {acceleration}", "try another compiler by CC="
         )
     return Check("small model", True, f"compiled and called in {perf_counter() - start:.1f} s")
-
-
-@contextmanager
-def _fresh_cache() -> Iterator[None]:
-    before = os.environ.get("EOMGEN_CACHE_DIR")
-    with TemporaryDirectory(prefix="eomgen-doctor-") as folder:
-        os.environ["EOMGEN_CACHE_DIR"] = folder
-        try:
-            yield
-        finally:
-            if before is None:
-                del os.environ["EOMGEN_CACHE_DIR"]
-            else:
-                os.environ["EOMGEN_CACHE_DIR"] = before
 
 
 def _check_cache() -> Check:
@@ -364,34 +349,17 @@ PART = 0.1  #: of the time in the file that is simulated
 
 
 class ExampleRun(NamedTuple):
-    """What became of one example.
-
-    Attributes
-    ----------
-    name, file : str
-    exit_code : int
-        0 where it ran; else the code with which a verb would have failed.
-    error : str
-        First line of the failure.
-    degrees_of_freedom, steps : int or None
-        Of the mechanism; of its run.  None of a Python script and of what failed before.
-    end : float or None
-        Until which time it was simulated (s).
-    seconds : dict of str to float
-        ``derive``, ``compile`` and ``simulate``, or ``script``.
-    warnings : list of str
-        Such as that a joint passed a limit.
-    """
+    """What became of one example."""
 
     name: str
     file: str
-    exit_code: int
-    error: str
-    degrees_of_freedom: int | None
+    exit_code: int  #: 0 where it ran; else the code with which a verb would have failed
+    error: str  #: first line of the failure
+    degrees_of_freedom: int | None  #: None of a Python script and of what failed before, as the next two
     steps: int | None
-    end: float | None
-    seconds: dict[str, float]
-    warnings: list[str]
+    end: float | None  #: until which time it was simulated (s)
+    seconds: dict[str, float]  #: ``derive``, ``compile`` and ``simulate``, or ``script``
+    warnings: list[str]  #: such as that a joint passed a limit
 
     @property
     def ok(self) -> bool:

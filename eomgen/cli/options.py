@@ -226,7 +226,7 @@ class Option(click.Option):
             notes += more
         attributes["type"] = click.Choice(get_args(hint)) if get_origin(hint) is Literal else TYPES.get(hint)
         for note in notes:
-            if isinstance(note, click.ParamType) or callable(note):
+            if callable(note) and note is not type(None):  # click's types are, too
                 attributes["type" if isinstance(note, click.ParamType) else "callback"] = note
         if hint is bool:
             attributes["is_flag"] = True

@@ -58,8 +58,10 @@ def run(
     work = source.compile()
     equations, module = work.equations, work.module
     check_columns(module, picture)
-    from .energy import balance_energy, counts_work, takes_impulses, uncounted_functions
+    from .energy import MOREAU, Power, balance_energy
 
+    power = Power(equations)
+    impulses = solver.keywords.get("method", module.info.simulation["method"]) == MOREAU
     start = perf_counter()
     with stage("simulate"):
         trajectory = module.simulate(
@@ -67,19 +69,18 @@ def run(
             initial=work.initial,
             parameters=work.parameters,
             inputs=work.inputs,
-            dense_output=not takes_impulses(module, solver.keywords)
-            and (plot is not None or animate is not None or counts_work(equations)),
+            dense_output=not impulses and (plot is not None or animate is not None or power.counts),
             **solver.keywords,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
     with after_integration():
-        energy = balance_energy(equations, trajectory)
+        energy = balance_energy(power, trajectory)
         files = _write(equations, trajectory, out, plot, picture)
         if animate is not None:
             with stage("animate"):
                 files.append(str(trajectory.animate(animate)))
         values = _run_to_dict(equations, trajectory, energy) | {"seconds": seconds}
-        uncounted = uncounted_functions(equations) if energy and energy.work is None else ()
+        uncounted = power.uncounted if energy and energy.work is None else ()
         tables = tables_of(trajectory, energy, uncounted)
     source.show(values, str(equations.report), *operations_of(equations), *tables, files=files)
 
