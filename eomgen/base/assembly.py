@@ -473,7 +473,8 @@ def close_nearest(
     """
     rough, scales = {name: value for name, value in guess.items() if name not in raw}, system.scales
     aim, cut = system.with_values(start, {**raw, **rough}), system.wanted(rough)
-    guessed = np.unique(scales.velocities(system.indices(rough)))  # velocities that move coordinates of the tree
+    # velocities that move coordinates of the tree; np.unique would load numpy.ma
+    guessed = np.array(sorted({*scales.velocities(system.indices(rough)).tolist()}), dtype=np.intp)
     free, held = system.closure(raw), system.closure({**raw, **rough})
 
     def distances(q: Array) -> Array:

@@ -51,8 +51,8 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
             return None
-        command: click.Command = getattr(import_module(f".{VERBS[cmd_name][0]}", __package__), cmd_name)
-        return command
+        result: click.Command = getattr(import_module(f".{VERBS[cmd_name][0]}", __package__), cmd_name)()
+        return result
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -183,14 +183,6 @@ DAY = 86400.0
 MEGABYTE = 1_000_000
 
 
-@click.group(invoke_without_command=True)
-@click.pass_context
-def cache(ctx: click.Context) -> None:
-    """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR sets their folder."""
-    if ctx.invoked_subcommand is None:
-        ctx.invoke(listing, as_json=False)
-
-
 def _cache() -> Cache:
     from ..toolchain.cache import Cache, cache_directory
 
@@ -242,8 +234,17 @@ def clear(as_json: bool) -> None:
     show(as_json, values, f"{kept.root}: removed {removed} entries", files=None)
 
 
-for _name, _verb in {"list": listing, "prune": prune, "clear": clear}.items():
-    cache.add_command(_verb, _name)
+def cache() -> click.Group:
+    """The verb of these verbs."""
+
+    @click.group(commands={"list": listing(), "prune": prune(), "clear": clear()}, invoke_without_command=True)
+    @click.pass_context
+    def cache(ctx: click.Context) -> None:
+        """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR sets their folder."""
+        if ctx.invoked_subcommand is None:
+            ctx.invoke(listing(), as_json=False)
+
+    return cache
 
 
 def _ago(moment: float) -> str:

@@ -12,7 +12,7 @@ from ..base.files import save_figure, write_whole
 from ..base.results import ResultTable
 from ..toolchain.targets import FMI_VERSIONS, FORMATS, PRECISIONS, TARGETS
 from .options import Source, require_folder, verb
-from .output import print_json, say, stage
+from .output import operations_of, print_json, say, stage, summary
 from .plot import require_plotting
 
 if TYPE_CHECKING:
@@ -119,34 +119,6 @@ def derive(
         written = _written(derived) if equations else {}
         parts = (str(derived.report), *operations_of(derived), *(_lines(written) if equations else ()))
         source.show(summary(derived) | written, *parts)
-
-
-def summary(derived: Equations) -> dict[str, Any]:
-    """What was derived, as plain values."""
-    return {
-        "name": derived.name,
-        "method": derived.method,
-        "choice": derived.choice.operations if derived.choice else None,
-        "report": derived.report.to_dict(),
-        "operations": {name: count.as_dict() | {"total": count.total} for name, count in derived.operations.items()},
-        "system": derived.system_size and dict(zip(("unknowns", "entries"), derived.system_size, strict=True)),
-        "seconds": derived.seconds,
-    }
-
-
-def operations_of(derived: Equations) -> Iterator[ResultTable | str]:
-    """The operations of each part of the equations: a heading, what was chosen, a table."""
-    yield ResultTable((), (), f"equations by {derived.method}: operations")
-    if derived.choice:
-        yield str(derived.choice)
-    if derived.system_size:
-        unknowns, entries = derived.system_size
-        yield f"a linear system of {unknowns} unknowns with {entries} nonzero entries"
-    rows = [
-        [name, *map(str, (c.multiplications, c.additions, c.divisions, c.total, sum(c.functions.values())))]
-        for name, c in derived.operations.items()
-    ]
-    yield ResultTable(["", "multiply", "add", "divide", "total", "functions"], rows)
 
 
 def _written(derived: Equations) -> dict[str, Any]:

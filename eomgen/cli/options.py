@@ -461,14 +461,17 @@ WANTED = ("settings", "allow_native", "method", "independent", "target", "robot"
 
 def verb(
     wanted: Sequence[str] = WANTED, targets: Sequence[str] = ("cython", "numpy")
-) -> Callable[[Callable[..., Any]], Verb]:
-    """Make a function a verb, whose options are its arguments with a text, and those of its groups.
+) -> Callable[[Callable[..., Any]], Callable[[], Verb]]:
+    """Make a function a call that gives its verb, whose options are its arguments with a text, and those of its groups.
 
     An argument of type :class:`Source` is a model file with the ``wanted`` options, one of type :class:`Prepared` the
     same compiled, parameters and inputs bound.  The first of the ``targets`` is the default.
     """
 
-    def decorate(function: Callable[..., Any]) -> Verb:
+    def decorate(function: Callable[..., Any]) -> Callable[[], Verb]:
+        return functools.cache(lambda: make(function))
+
+    def make(function: Callable[..., Any]) -> Verb:
         hints = {name: hint for name, (hint, _) in arguments(function).items()}
         source = bool({Source, Prepared} & {hint for hint in hints.values() if isinstance(hint, type)})
 

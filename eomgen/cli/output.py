@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -26,6 +26,9 @@ from ..errors import (
     ToolchainError,
     UsageError,
 )
+
+if TYPE_CHECKING:
+    from ..api.equations import Equations
 
 WIDTH = 120  #: of tables that do not go to a terminal
 
@@ -116,6 +119,34 @@ def readable_size(size: int) -> str:
     if size < 1000:
         return f"{size} B"
     return f"{size / 1000:.0f} kB" if size < 1_000_000 else f"{size / 1e6:.1f} MB"
+
+
+def summary(derived: Equations) -> dict[str, Any]:
+    """What was derived, as plain values."""
+    return {
+        "name": derived.name,
+        "method": derived.method,
+        "choice": derived.choice.operations if derived.choice else None,
+        "report": derived.report.to_dict(),
+        "operations": {name: count.as_dict() | {"total": count.total} for name, count in derived.operations.items()},
+        "system": derived.system_size and dict(zip(("unknowns", "entries"), derived.system_size, strict=True)),
+        "seconds": derived.seconds,
+    }
+
+
+def operations_of(derived: Equations) -> Iterator[ResultTable | str]:
+    """The operations of each part of the equations: a heading, what was chosen, a table."""
+    yield ResultTable((), (), f"equations by {derived.method}: operations")
+    if derived.choice:
+        yield str(derived.choice)
+    if derived.system_size:
+        unknowns, entries = derived.system_size
+        yield f"a linear system of {unknowns} unknowns with {entries} nonzero entries"
+    rows = [
+        [name, *map(str, (c.multiplications, c.additions, c.divisions, c.total, sum(c.functions.values())))]
+        for name, c in derived.operations.items()
+    ]
+    yield ResultTable(["", "multiply", "add", "divide", "total", "functions"], rows)
 
 
 # -- failures ----------------------------------------------------------------------------------------------------------

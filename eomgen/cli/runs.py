@@ -13,10 +13,8 @@ from ..analysis.linearization import without_noise
 from ..base.limits.numbers import RESTING
 from ..base.results import ResultTable
 from ..errors import ModelError, ToolchainError, at_odds, bad_file, ill_shaped, incomplete
-from ..runtime.storage import RUNS
-from .models import operations_of, summary
 from .options import WANTED, End, Integration, Names, Positive, Source, Span, Texts, parse_spans, require_folder, verb
-from .output import after_integration, say, stage
+from .output import after_integration, operations_of, say, stage, summary
 from .plot import Picture, check_columns, check_picture, find_paths, plot_run
 
 if TYPE_CHECKING:
@@ -87,8 +85,11 @@ def run(
 
 def _check_files(out: Path | None, plot: Path | None, picture: Picture) -> None:
     """Fail before the work if what comes of it cannot be written."""
-    if out is not None and out.suffix not in RUNS:
-        raise bad_file(f"--out {out}: a run is written as {' or '.join(RUNS)}")
+    if out is not None:
+        from ..runtime.storage import RUNS  # which takes as long to import as all verbs
+
+        if out.suffix not in RUNS:
+            raise bad_file(f"--out {out}: a run is written as {' or '.join(RUNS)}")
     check_picture(plot, picture)
     require_folder("--out", out)
     require_folder("--plot", plot)

@@ -140,8 +140,8 @@ class Looks:
         speed = np.abs(x[self.n_q :] / layout.scales.q[:, None])[held].max(axis=0, initial=0.0)
         motion = np.abs(np.diff(t)) * np.maximum(speed[1:], speed[:-1])
         parts = np.maximum(1.0, np.ceil(motion / max(SPACING, float(motion.sum()) / MOST))).astype(int)
-        pieces = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(t[:-1], t[1:], parts, strict=True)]
-        self.times = np.append(np.concatenate(pieces), t[-1])
+        place = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+        self.times = np.append(place * np.repeat(np.diff(t) / parts, parts) + np.repeat(t[:-1], parts), t[-1])
         values = singular_values(module, self.times, self.curve(self.times), self._inputs(self.times))
         self.least = values[:, self.rank - 1]
         self.held = held
