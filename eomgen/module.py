@@ -1,5 +1,7 @@
 """What a user holds: a BoundModel with every run and analysis as a method; each loads when it is first called.
 
+Type checkers and editors read ``module.pyi``, which ``tools/stubs.py`` writes from the tables here.
+
 Analyses and runs call each other's functions: a subclass that overrides a method changes that call alone.
 """
 
@@ -10,44 +12,11 @@ from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from types import MethodType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .errors import UnavailableError, ill_typed
 from .runtime.argument_checks import both_names, find_lacking, plain_names
 from .runtime.bound_model import BoundModel
-
-if TYPE_CHECKING:
-    from .analysis.base_parameters import base_parameters as _base_parameters
-    from .analysis.consistent import consistent as _consistent
-    from .analysis.drive import actuator_forces as _actuator_forces
-    from .analysis.equilibrium import equilibrium as _equilibrium
-    from .analysis.fit import fit as _fit
-    from .analysis.impact import impact as _impact
-    from .analysis.impact import simulate_impacts as _simulate_impacts
-    from .analysis.kinematic import kinematic_analysis as _kinematic_analysis
-    from .analysis.kinematic import motion_range as _motion_range
-    from .analysis.linear import linearize as _linearize
-    from .analysis.modes import modes as _modes
-    from .analysis.reactions import driving_forces as _driving_forces
-    from .analysis.reactions import reactions as _reactions
-    from .analysis.reactions import undetermined_reactions as _undetermined_reactions
-    from .analysis.regressor import inertial_remainder as _inertial_remainder
-    from .analysis.regressor import regressor as _regressor
-    from .analysis.regressor import standard_parameters as _standard_parameters
-    from .analysis.sensitivities import sensitivities as _sensitivities
-    from .codegen.targets.web import page as _page
-    from .runtime.constrained import multipliers as _multipliers
-    from .runtime.drawing import draw as _draw
-    from .runtime.drawing import draw_branches as _draw_branches
-    from .runtime.drawing import report as _report
-    from .runtime.ensembles.ensemble import simulate_many as _simulate_many
-    from .runtime.minimal import Canonical, Minimal
-    from .runtime.runs.dae_solution import Dae
-    from .runtime.runs.integrator import integrator as _integrator
-    from .runtime.runs.integrator import step as _step
-    from .runtime.runs.simulate import simulate as _simulate
-    from .verify.verify import verify as _verify
-
 
 #: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
 CALLS: dict[str, str | Callable[..., Any]] = {
@@ -83,11 +52,14 @@ CALLS: dict[str, str | Callable[..., Any]] = {
 
 
 #: Other form of the same equations -> the file of its class.
-FORMS = {
+FORMS: dict[str, str] = {
     "minimal": "runtime.minimal",
     "canonical": "runtime.minimal",
     "dae": "runtime.runs.dae_solution",
 }
+
+
+SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor")  #: for ``solve_ivp(method=...)``
 
 
 def find_function(file: str, name: str) -> Any:
@@ -229,57 +201,17 @@ class Module(BoundModel):
             core = load_source(f"{__package__}._{module.name}", file, Path(file).read_bytes())
         return cls(core, module.p, module.constant_inputs)
 
-    if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
-        simulate = _simulate
-        simulate_many = _simulate_many
-        integrator = _integrator
-        step = _step
-        verify = _verify
-        linearize = _linearize
-        modes = _modes
-        equilibrium = _equilibrium
-        sensitivities = _sensitivities
-        fit = _fit
-        standard_parameters = _standard_parameters
-        regressor = _regressor
-        inertial_remainder = _inertial_remainder
-        base_parameters = _base_parameters
-        multipliers = _multipliers
-        reactions = _reactions
-        undetermined_reactions = _undetermined_reactions
-        driving_forces = _driving_forces
-        actuator_forces = _actuator_forces
-        impact = _impact
-        simulate_impacts = _simulate_impacts
-        consistent = _consistent
-        kinematic_analysis = _kinematic_analysis
-        motion_range = _motion_range
-        report = _report
-        draw = _draw
-        draw_branches = _draw_branches
-        page = _page
-        minimal: Minimal
-        canonical: Canonical
-        dae: Dae
-        DOP853: type[Any]
-        RK45: type[Any]
-        RK23: type[Any]
-        Radau: type[Any]
-        Taylor: type[Any]
+    def __getattr__(self, name: str) -> Any:
+        if name in SOLVERS:
+            from .runtime.runs.integrator import find_solver
 
-    else:
-
-        def __getattr__(self, name: str) -> Any:
-            if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-                from .runtime.runs.integrator import find_solver
-
-                return find_solver(self, name)
-            if name in CALLS:  # an analysis of a user's own
-                return LazyMethod(name).__get__(self, type(self))
-            if name in FORMS:
-                form = self.__dict__[name] = find_function(FORMS[name], name.capitalize())(self)
-                return form
-            return find_lacking(self, "a Module", name)
+            return find_solver(self, name)
+        if name in CALLS:  # an analysis of a user's own
+            return LazyMethod(name).__get__(self, type(self))
+        if name in FORMS:
+            form = self.__dict__[name] = find_function(FORMS[name], name.capitalize())(self)
+            return form
+        return find_lacking(self, "a Module", name)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *CALLS, *FORMS})

@@ -1,7 +1,7 @@
-"""The tables of types -> eomgen/model/element_methods.pyi, for editors and type checkers.
+"""The tables of types and calls -> element_methods.pyi and module.pyi, for editors and type checkers.
 
-The build of the package and ``make lint`` write it.  It has the first sentence of each method; ``help(Model.spring)``
-has the rest.
+The build of the package and ``make lint`` write them.  Of methods that add elements there is the first sentence;
+``help(Model.spring)`` has the rest.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ sys.path.insert(0, str(ROOT))  # of the eomgen beside this file, whichever is in
 from eomgen.elements.element_type import ElementType  # noqa: E402
 from eomgen.model.element_methods import ElementMethods, methods  # noqa: E402
 from eomgen.model.methods import RESULTS, arguments_of, documentation_of, laws_of  # noqa: E402
+from eomgen.module import CALLS, FORMS, SOLVERS  # noqa: E402
 
-HOME = ROOT / "eomgen" / "model" / "element_methods.pyi"
 _HEAD = '''# Written by python tools/stubs.py from the tables of types.
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,37 @@ class ElementMethods(Described):
 '''
 
 
-def stub() -> str:
+_MODULE = """# Written by python tools/stubs.py from the tables of calls.
+
+from collections.abc import Callable
+from typing import Any
+
+from .runtime.bound_model import BoundModel
+{imports}
+
+CALLS: dict[str, str | Callable[..., Any]]
+FORMS: dict[str, str]
+SOLVERS: tuple[str, ...]
+
+def find_function(file: str, name: str) -> Any: ...
+
+class Module(BoundModel):
+    @classmethod
+    def of(cls, package: Any) -> Module: ...
+{names}
+"""
+
+
+def module_stub() -> str:
+    """The text of module.pyi."""
+    homes = CALLS | {form.capitalize(): home for form, home in FORMS.items()}
+    imports = [f"from .{home} import {name} as _{name}" for name, home in homes.items()]
+    names = [f"{name} = _{name}" for name in CALLS] + [f"{form}: _{form.capitalize()}" for form in FORMS]
+    names += [f"{name}: type[Any]" for name in SOLVERS]
+    return _MODULE.format(imports="\n".join(imports), names="\n".join(f"    {name}" for name in names))
+
+
+def element_stub() -> str:
     """The text of element_methods.pyi."""
     text = _HEAD.format(_summary(ElementMethods.joint.__doc__ or ""))
     return text + "".join(_method(section, found) for section, types in methods().items() for found in types)
@@ -73,10 +103,11 @@ def _summary(doc: str) -> str:
 
 
 def write() -> None:
-    """Write the file, if it differs."""
-    text = stub()
-    if not HOME.exists() or HOME.read_text(encoding="utf-8") != text:
-        HOME.write_text(text, encoding="utf-8")
+    """Write the files that differ."""
+    for name, text in (("model/element_methods.pyi", element_stub()), ("module.pyi", module_stub())):
+        home = ROOT / "eomgen" / name
+        if not home.exists() or home.read_text(encoding="utf-8") != text:
+            home.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -139,7 +139,7 @@ def test_wheel_and_sdist_hold_everything(built: Path) -> None:
             folder
         )
         assert {f"{folder}/{name}" for name in shipped(folder, copy)} <= sources
-    assert {f"eomgen/{name}" for name in (*shipped("eomgen", copy), "model/element_methods.pyi")} <= names
+    assert {f"eomgen/{name}" for name in (*shipped("eomgen", copy), "model/element_methods.pyi", "module.pyi")} <= names
     assert sum(name.startswith("eomgen/_native.") and name.endswith(".so") for name in names) == 1
     assert not any(name.startswith(("tests/", "docs/", "benchmarks/")) for name in names)
     assert any(name.endswith("LICENSE") for name in names)
