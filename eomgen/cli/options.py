@@ -477,12 +477,13 @@ def verb(
 
         @functools.wraps(function)
         def call(**values: Any) -> Any:
+            own = {name: values.pop(name) for name in hints if name in values}  # which a group may have, too
             for name, hint in hints.items():
                 if hint is Prepared:
-                    values[name] = gather(Source, values).compile().bound()
+                    own[name] = gather(Source, values).compile().bound()
                 elif hasattr(hint, "SECTION"):
-                    values[name] = gather(hint, values)
-            return function(**values)
+                    own[name] = gather(hint, values)
+            return function(**own)
 
         params: list[click.Parameter] = list(options_of(function, wanted))
         if source:

@@ -157,16 +157,12 @@ MODEL, USAGE, TOOLCHAIN, INTEGRATION, BREACH = 1, 2, 3, 4, 5
 OPTIONS = {
     "initial={...}": "--set NAME=VALUE",
     "step=,": "--step,",
-    "limits=True": "--within-limits",
-    "; give limits={name: ..}": "",
     "method='moreau'": "--solver moreau",
     "treat any gap as closed (closed=True, --closed)": "treat any gap as closed by --closed",
     "floating=True, or --floating": "--floating",
     "partial=True": "--partial",
     "weights={name: weight}": "--weight NAME=W",
     "weights='mass'": "--mass",
-    "leave dense_output out and give t_eval, or take DOP853, RK45 or Radau in compiled code": "leave --plot out, "
-    "or take --solver DOP853, RK45 or Radau with --target cython",
 }
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
