@@ -10,8 +10,8 @@ what rounding leaves of a zero, far below any inertia beside it, is compared wit
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from types import TracebackType
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -34,105 +34,55 @@ def _failed(what: str, *matrices: Any) -> EvaluationError:
     return UnsolvedError(f"{what}: the matrix is singular, or its entries differ too much in size")
 
 
-class _NamedFailure:
-    """NumPy's LinAlgError within the block -> an error that says what failed, and why."""
+def _named(what: str, call: Callable[..., Any]) -> Callable[..., Any]:
+    """The call, with an error that says what failed, and why, in place of NumPy's LinAlgError."""
 
-    def __init__(self, what: str, *matrices: Any) -> None:
-        self.what, self.matrices = what, matrices
+    def named(*matrices: Any, **options: Any) -> Any:
+        try:
+            return call(*matrices, **options)
+        except np.linalg.LinAlgError:
+            raise _failed(what, *matrices) from None
 
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        if isinstance(error, np.linalg.LinAlgError):
-            raise _failed(self.what, *self.matrices) from None
+    return named
 
 
-def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
-    """U, singular values, V^T."""
-    with _NamedFailure("singular values cannot be found", A):
-        U, sizes, Vt = np.linalg.svd(A, full_matrices=full_matrices)
-    if not np.isfinite(sizes).all():
-        raise _failed("singular values cannot be found", A)
-    return U, sizes, Vt
+def _svd(A: Any, **options: Any) -> Any:
+    result = np.linalg.svd(A, **options)
+    if not np.isfinite(result if isinstance(result, np.ndarray) else result[1]).all():
+        raise np.linalg.LinAlgError
+    return result
 
 
-def qr(A: Any, complete: bool = False) -> tuple[Array, Array]:
-    """Q of orthonormal columns and the triangle R; ``complete``: Q is square."""
-    with _NamedFailure("a matrix has no orthonormal basis", A):
-        Q, R = np.linalg.qr(A, mode="complete" if complete else "reduced")
-    return Q, R
-
-
-def singular_values(A: Any) -> Array:
-    """Singular values, the largest first."""
-    with _NamedFailure("singular values cannot be found", A):
-        sizes = np.asarray(np.linalg.svd(A, compute_uv=False))
-    if not np.isfinite(sizes).all():
-        raise _failed("singular values cannot be found", A)
-    return sizes
-
-
-def eigh(A: Any) -> tuple[Array, Array]:
-    """Eigenvalues and eigenvectors of a symmetric matrix."""
-    with _NamedFailure("eigenvalues cannot be found", A):
-        values, vectors = np.linalg.eigh(A)
-    return values, vectors
-
-
-def eigvalsh(A: Any) -> Array:
-    """Eigenvalues of a symmetric matrix, the smallest first."""
-    with _NamedFailure("eigenvalues cannot be found", A):
-        return np.asarray(np.linalg.eigvalsh(A))
-
-
-def eig(A: Any) -> tuple[Any, Any]:
-    """Eigenvalues and eigenvectors, complex where they are."""
-    with _NamedFailure("eigenvalues cannot be found", A):
-        values, vectors = np.linalg.eig(A)
-    return values, vectors
-
-
-def eigvals(A: Any) -> Any:
-    """Eigenvalues, complex where they are."""
-    with _NamedFailure("eigenvalues cannot be found", A):
-        return np.linalg.eigvals(A)
-
-
-def solve(A: Any, b: Any) -> Array:
-    """x with A x = b."""
-    with _NamedFailure("linear equations have no solution", A, b):
-        return np.asarray(np.linalg.solve(A, b))
-
-
-def inv(A: Any) -> Any:
-    """A^-1."""
-    with _NamedFailure("a matrix has no inverse", A):
-        return np.linalg.inv(A)
-
-
-def pinv(A: Any, rcond: float | None = None) -> Array:
-    """A^+; entries of A below ``rcond`` of the largest singular value count as zero."""
-    with _NamedFailure("a matrix has no pseudo-inverse", A):
-        return np.asarray(np.linalg.pinv(A) if rcond is None else np.linalg.pinv(A, rcond=rcond))
+#: U, singular values, V^T.
+svd: Callable[..., tuple[Array, Array, Array]] = _named("singular values cannot be found", _svd)
+#: Singular values, the largest first.
+singular_values: Callable[[Any], Array] = partial(svd, compute_uv=False)  # type: ignore[assignment]
+#: Q of orthonormal columns and the triangle R; ``mode="complete"``: Q is square.
+qr: Callable[..., tuple[Array, Array]] = _named("a matrix has no orthonormal basis", np.linalg.qr)
+#: Eigenvalues and eigenvectors of a symmetric matrix.
+eigh: Callable[[Any], tuple[Array, Array]] = _named("eigenvalues cannot be found", np.linalg.eigh)
+#: Eigenvalues of a symmetric matrix, the smallest first.
+eigvalsh: Callable[[Any], Array] = _named("eigenvalues cannot be found", np.linalg.eigvalsh)
+#: Eigenvalues and eigenvectors, complex where they are.
+eig: Callable[[Any], tuple[Any, Any]] = _named("eigenvalues cannot be found", np.linalg.eig)
+#: Eigenvalues, complex where they are.
+eigvals: Callable[[Any], Any] = _named("eigenvalues cannot be found", np.linalg.eigvals)
+#: x with A x = b.
+solve: Callable[[Any, Any], Array] = _named("linear equations have no solution", np.linalg.solve)
+#: A^-1.
+inv: Callable[[Any], Any] = _named("a matrix has no inverse", np.linalg.inv)
+#: A^+; entries of A below ``rcond`` of the largest singular value count as zero.
+pinv: Callable[..., Array] = _named("a matrix has no pseudo-inverse", np.linalg.pinv)
+#: L with L L^T = A.
+cholesky: Callable[[Any], Array] = _named("a matrix is not positive definite", np.linalg.cholesky)
+#: The largest singular value over the smallest.
+cond: Callable[[Any], float] = _named("a condition number cannot be found", lambda A: float(np.linalg.cond(A)))
+_lstsq = _named("linear equations have no solution", np.linalg.lstsq)
 
 
 def lstsq(A: Any, b: Any, rcond: float | None = None) -> Array:
     """The x of least norm with least |A x - b|."""
-    with _NamedFailure("linear equations have no solution", A, b):
-        return np.asarray(np.linalg.lstsq(A, b, rcond=rcond)[0])
-
-
-def cholesky(A: Any) -> Array:
-    """L with L L^T = A."""
-    with _NamedFailure("a matrix is not positive definite", A):
-        return np.asarray(np.linalg.cholesky(A))
-
-
-def cond(A: Any) -> float:
-    """The largest singular value over the smallest."""
-    with _NamedFailure("a condition number cannot be found", A):
-        return float(np.linalg.cond(A))
+    return np.asarray(_lstsq(A, b, rcond=rcond)[0])
 
 
 def norm2(A: Any) -> float:

@@ -130,7 +130,7 @@ def _svd(A: Array) -> tuple[Array, Array, Array]:
 
 def _qr(A: Array) -> tuple[Array, Array]:
     """Q (c, c) and the triangle; none where all directions are in further rows."""
-    return algebra.qr(A, complete=True) if len(A) > A.shape[1] > 0 else (np.eye(len(A)), A)
+    return algebra.qr(A, mode="complete") if len(A) > A.shape[1] > 0 else (np.eye(len(A)), A)
 
 
 class SparseRows:
