@@ -161,10 +161,14 @@ class Constructs(SphinxDirective):
 
 
 def support_table() -> Iterator[str]:
-    """The lines of a table of calls and the kinds of models that each excludes."""
+    """The lines of a table of calls and the kinds of models that each excludes, and of what is said instead."""
     yield from ("| call | not for models with |", "|---|---|")
     for call, excluded in EXCLUDED.items():
         yield f"| `{call}` | {_cell('; '.join(KINDS[kind].about for kind in excluded))} |"
+    yield from ("", "| models with | message, with what to do instead |", "|---|---|")
+    for kind in KINDS.values():
+        message = kind.message.format(call="the call", model="NAME", names="the names")
+        yield f"| {_cell(kind.about)} | {_cell(message)} |"
     yield ""
 
 
