@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 from ..base.limits import constraints, numbers, runs
 from ..base.limits.numbers import SMALL_LOOP
@@ -11,13 +12,17 @@ from ..base.limits.numbers import SMALL_LOOP
 FLOOR = {"ROUNDING": numbers, "INERTIA": numbers, "CONSTRAINTS": constraints, "RUNS": runs}
 #: All that stand before names: those of the floor, change points, linear systems of a method, rigid contacts.
 KINDS = (*FLOOR, "CROSSINGS", "SYSTEMS", "RIGID")
-_USED = re.compile(rf"\b({'|'.join(KINDS)})_([A-Z][A-Z_]*)\b")
+_NAME = re.compile(r"[A-Z][A-Z_]*\b")
 
 
 def definitions(text: str) -> str:
     """``#define`` lines, one for each limit that a text names; empty if it names none."""
-    used = sorted({(match[1], match[2]) for match in _USED.finditer(text)})
-    return "".join(f"#define {kind}_{name} {_in_c(_find(kind, name))}\n" for kind, name in used)
+    used = set()
+    for kind in KINDS:  # one pattern for all takes six times as long, in every process of a clone
+        for before, after in pairwise(text.split(f"{kind}_")):
+            if not (before[-1:].isalnum() or before.endswith("_")) and (match := _NAME.match(after)):
+                used.add((kind, match[0]))
+    return "".join(f"#define {kind}_{name} {_in_c(_find(kind, name))}\n" for kind, name in sorted(used))
 
 
 def _find(kind: str, name: str) -> object:
