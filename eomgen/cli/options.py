@@ -477,12 +477,10 @@ def verb(
 
         @functools.wraps(function)
         def call(**values: Any) -> Any:
-            own = {name: values.pop(name) for name in hints if name in values}  # which a group may have, too
-            for name, hint in hints.items():
-                if hint is Prepared:
-                    own[name] = gather(Source, values).compile().bound()
-                elif hasattr(hint, "SECTION"):
-                    own[name] = gather(hint, values)
+            groups = {name: hint for name, hint in hints.items() if hint is Prepared or hasattr(hint, "SECTION")}
+            own = {name: values.pop(name) for name in hints.keys() - groups.keys() if name in values}  # first of all
+            for name, hint in groups.items():
+                own[name] = gather(Source, values).compile().bound() if hint is Prepared else gather(hint, values)
             return function(**own)
 
         params: list[click.Parameter] = list(options_of(function, wanted))
