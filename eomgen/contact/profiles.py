@@ -233,8 +233,8 @@ class ProfilePiece(Contact):
     ground: bool = False
 
     def deepest(self, view: View) -> Expr | None:
-        share = self.share(view)
-        if not self.ground or share is None:
+        share = self.share(view) if self.ground else None
+        if share is None:
             return None
         return where(view.graph.apply("lt", 0.0, share), self.radius + self.sizes[-1], NOWHERE)
 

@@ -9,6 +9,7 @@ from functools import reduce
 from operator import add
 
 from ..elements.forces.force import View, where
+from ..elements.forces.normal_laws import NormalLaw
 from ..elements.frames import Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
@@ -152,6 +153,9 @@ class AtHeight(Contact):
 
     def deepest(self, view: View) -> Expr | None:
         return self.flat.deepest(view)
+
+    def law_here(self, view: View) -> NormalLaw:
+        return self.flat.law_here(view)
 
     def couple(self, view: View) -> Vec3 | None:
         return self.flat.couple(view)
