@@ -339,6 +339,8 @@ class GapEvents(Events):
         Impacts after which the run ends.
     end : float
         Of the run (s).
+    controllers : mapping or None
+        As for ``simulate``.
 
     Attributes
     ----------
@@ -347,8 +349,10 @@ class GapEvents(Events):
         Why the run is over; empty while it is not.
     """
 
-    def __init__(self, gaps: Gaps, restitutions: Mapping[str, float], rough: Rough, most: int, end: float) -> None:
-        super().__init__(gaps.layout, _ending(gaps.module))
+    def __init__(
+        self, gaps: Gaps, restitutions: Mapping[str, float], rough: Rough, most: int, end: float, controllers: Any
+    ) -> None:
+        super().__init__(gaps.layout, _ending(gaps.module), controllers)
         self.gaps, self.restitutions, self.rough, self.most, self.end = gaps, restitutions, rough, most, end
         self.limits = allowance(gaps.layout, gaps.names, TOUCHING)
         self.impacts: list[tuple[float, Impact]] = []
@@ -488,7 +492,7 @@ def simulate_impacts(
     most : int
         Number of impacts after which the run ends: impacts accumulate as a body comes to rest.
     **options
-        method, rtol, atol, max_step, first_step, as for ``simulate``.
+        method, rtol, atol, max_step, first_step, controllers, as for ``simulate``.
 
     Returns
     -------
@@ -521,7 +525,8 @@ def simulate_impacts(
     if end < start:
         raise cannot(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
     forcing.begin(start, end)
-    events = GapEvents(Gaps(bound, tuple(result), forcing if forcing else None), result, rough, most, end)
+    watched, controllers = Gaps(bound, tuple(result), forcing if forcing else None), options.pop("controllers", None)
+    events = GapEvents(watched, result, rough, most, end, controllers)
     before = find_state(bound, initial, start, forcing)
     first = events.begin(start, before)
     events.arm(start, first)

@@ -254,6 +254,10 @@ def test_a_function_of_the_run_gives_what_the_model_leaves_open(target: str, met
     assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-12
     assert np.abs(called - 0.1 * np.arange(11)).max() < 1e-15
     assert np.abs(module.simulate(1.05)["s"]).max() == 0.0  # without one it keeps its value
+    called.clear()
+    hit = module.simulate_impacts(1.05, {"s": 0.5}, method=method, controllers={"u": drive})
+    assert (hit.impacts, len(called)) == ([], 11)
+    np.testing.assert_allclose(hit.x[:4, -1], run.x[:4, -1], rtol=0.0, atol=1e-12)
 
 
 def test_controllers_that_cannot_be_are_refused(module: Any) -> None:
@@ -268,6 +272,7 @@ def test_controllers_that_cannot_be_are_refused(module: Any) -> None:
         (["u"], "EG-TYPE controllers"),
     ):
         refuses(words, module.simulate, 1.0, controllers=given)
+        refuses(words, module.simulate_impacts, 1.0, {"s": 0.5}, controllers=given)
     refuses("EG-NUMBER u nan 0", module.simulate, 1.0, controllers={"u": lambda t, x: float("nan")})
     with refused("EG-UNSUPPORTED none"):
         eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
