@@ -347,7 +347,8 @@ def _attachments(
             message = f"{component.name} has no attachment {name!r}"
             fault(f"{path}.at.{name}", message, nearest(str(name), known, "it has"), "EG-NAME-UNKNOWN")
     remedy = "give a body, body.marker, ground or {body, at, rpy}"
-    for name in known:
+    unknown = [name for name in instance.at if name not in (*known, *component.names.bodies)]
+    for name in (*known, *unknown):
         attached = _attached(target, instance.at[name]) if name in instance.at else None
         if attached is not None:
             result[name] = attached

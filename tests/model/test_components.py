@@ -340,6 +340,15 @@ def test_faults_of_adding(folder: Path, old: str, new: str, told: str) -> None:
     assert len(caught.value.problems) <= 2  # and not what follows from the missing names
 
 
+@pytest.mark.parametrize("attachments", ["", "attachments: [root], "])
+def test_a_wrong_attachment_is_one_fault(folder: Path, attachments: str) -> None:
+    leg = "bodies: {foot: {mass: 1}}, joints: {j: {type: prismatic, between: [base, foot], axis: x}}"
+    text = f"name: w\ncomponents:\n  leg: {{{attachments}{leg}}}\nadd:\n  a: {{component: leg, at: {{base: ground}}}}\n"
+    with refused("EG-NAME-UNKNOWN :5: add.a.at.base: leg no attachment 'base' ground") as caught:
+        load(folder, text, "legs.yaml").check()
+    assert [one.path for one in caught.value.problems] == ["add.a.at.base"] + ["add.a.at.root"] * bool(attachments)
+
+
 BESIDE = [  # faults elsewhere are reported together with those of an instance, and an expression where it stands
     ("at: cart.top,", "at: cart.tip,", ["EG-TYPE :18: add.left.at.root: cart.tip", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
     ("at: cart.top,", "", ["EG-MISSING :18: add.left.at.root:", "EG-NAME-UNKNOWN cart.mass: 'M'"]),
