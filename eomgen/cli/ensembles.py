@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import sys
 from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
@@ -13,9 +14,10 @@ import click
 from ..base.files import open_plain, save_figure, write_whole
 from ..errors import UsageError, at_odds, bad_data, bad_file, ill_shaped, incomplete, no_number, off_range
 from ..runtime.argument_checks import require, require_size
+from ..runtime.ensembles.block import BAD_PARAMETERS
 from ..runtime.storage import split_head, write_netcdf
 from .options import Count, End, Integration, Prepared, Seed, Texts, parse_spans, require_folder, verb
-from .output import stage
+from .output import MODEL, stage
 
 if TYPE_CHECKING:
     from ..module import Module
@@ -102,6 +104,8 @@ def ensemble(
         values=result.to_dict() | {"varied": varied},
         files=[path for path in (out, plot and plot[1]) if path],
     )  # fmt: skip
+    if any(one.status == BAD_PARAMETERS for one in failures):
+        sys.exit(MODEL)
 
 
 def _even(end: float, count: int) -> list[float]:

@@ -171,6 +171,7 @@ def refused_runs(info: ModelInfo, p: Array) -> dict[int, list[Problem]]:
     """The runs whose parameters, of (n_p, k), the model itself could not declare, and what is wrong with these.
 
     Values that are not finite are told by whatever computes with them, and rules without finite numbers judge nothing.
+    Of many runs, one with a parameter out of its range is not judged by rules, which take long.
     """
     result: dict[int, list[Problem]] = {}
 
@@ -184,9 +185,10 @@ def refused_runs(info: ModelInfo, p: Array) -> dict[int, list[Problem]]:
     for k, path, *data in info.ranges:
         for run in np.flatnonzero(~Allowed(*data[:4]).has(p[k]) & np.isfinite(p[k])).tolist():
             note(run, path, judge_range(p[k, run : run + 1], *data), [k])
+    left = np.array([k for k in range(p.shape[1]) if k not in result or p.shape[1] == 1], dtype=int)
     for path, rule, data, used, tape in info.rules:
-        for run, values in _to_look_at(rule, data, tape, p):
-            note(run, path, RULES[rule](values, *data), used)
+        for k, values in _to_look_at(rule, data, tape, p[:, left]):
+            note(int(left[k]), path, RULES[rule](values, *data), used)
     return result
 
 

@@ -322,6 +322,11 @@ def test_a_table_of_cases(call: Call, tmp_path: Path) -> None:
         (tmp_path / "cases.csv").write_text(text)
         wrong = call("ensemble", CRANK, *NUMPY, "--cases", "cases.csv")
         assert (wrong.code, message in wrong.err) == (2, True)
+    for mass, code in (("0.5", 0), ("-1", 1), ("nan", 1)):  # results of the others are written, the exit code says it
+        (tmp_path / "cases.csv").write_text(f"m_s\n0.5\n{mass}\n")
+        result = call("ensemble", *words, "--cases", "cases.csv", "--out", "ends.csv")
+        assert (result.code, result.json["count"], len(result.json["failures"])) == (code, 2, code)
+        assert np.isfinite(table(tmp_path / "ends.csv")["theta"]).sum() == 2 - code
 
 
 def test_values_drawn_and_on_a_grid(call: Call, tmp_path: Path) -> None:

@@ -32,11 +32,13 @@ from ..runs.simulate import simulate
 from ..storage import attributes, free, table_path
 from ..trajectory import Span
 from .block import (
+    BAD_PARAMETERS,
     EVENT,
     GRAIN,
     LOST,
     MEANING,
     RUNS,
+    UNASSEMBLED,
     Custom,
     Kept,
     Plan,
@@ -88,7 +90,8 @@ class Failure(NamedTuple):
 
     def __str__(self) -> str:
         values = place([*self.values], np.array([*self.values.values()])).removeprefix(", ")
-        return f"run {self.run}{f' ({values})' * bool(values)} ended at t = {self.t:.6g} s: {self.message}"
+        how = "did not begin" if self.status in (BAD_PARAMETERS, UNASSEMBLED) else f"ended at t = {self.t:.6g} s"
+        return f"run {self.run}{f' ({values})' * bool(values)} {how}: {self.message}"
 
 
 class Ensemble(Result):

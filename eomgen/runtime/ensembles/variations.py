@@ -26,7 +26,17 @@ from ...base.limits.constraints import (
 )
 from ...base.names import place_of_marker
 from ...base.value_rules import read_count
-from ...errors import AssemblyError, EomgenError, ParameterError, UsageError, at_odds, ill_shaped, incomplete, no_number
+from ...errors import (
+    AssemblyError,
+    EomgenError,
+    ParameterError,
+    Problem,
+    UsageError,
+    at_odds,
+    ill_shaped,
+    incomplete,
+    no_number,
+)
 from ..argument_checks import check_names, read_axis, read_numbers, require_mapping, require_size, without_dots
 from ..initial import Initial
 from ..kernels import Kernels
@@ -187,7 +197,8 @@ def collect_variations(
     """Bring initial values, parameters and inputs together, each by name, or as arrays (n,) or (n, k).
 
     The number of runs is the count where no array gives it.  Unknown names, values that are not finite, and lengths
-    that differ are refused, all named; parameters that the model does not allow only where no run has others.
+    that differ are refused, all named; parameters that are not finite or that the model does not allow only where no
+    run has others.
     """
     lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
     p = _bound("parameter", module, parameters, lengths)
@@ -225,10 +236,10 @@ def _bound(what: str, module: BoundModel, raw: Any, lengths: dict[str, int]) -> 
     layout = module.layout
     names, base = (layout.p, module.p) if what == "parameter" else (layout.u, module.u)
     if not isinstance(raw, Mapping):
-        return _columns(f"{what}s", raw, names, lengths)
+        return _columns(f"{what}s", raw, names, lengths, what == "input")
     raw = without_dots(raw, layout.instances)
     check_names(what, raw, names)
-    values = {name: _numbers(f"{what} {name}", x, lengths) for name, x in raw.items()}
+    values = {name: _numbers(f"{what} {name}", x, lengths, what == "input") for name, x in raw.items()}
     _require_one_length(lengths)
     k = next((len(x) for x in values.values() if np.ndim(x)), None)
     result = base.copy() if k is None else np.repeat(base[:, None], k, axis=1)
@@ -241,8 +252,13 @@ def _refused(module: BoundModel, p: Array) -> dict[int, str]:
     """Why runs with parameters (n_p,) or (n_p, k) do not begin, by run; refused at once where none would."""
     columns = p if p.ndim > 1 else p[:, None]
     problems = refused_runs(module.info, columns)
-    if problems and len(problems) == columns.shape[1]:
-        raise ParameterError(problems[0])
+    for row, k in np.argwhere(~np.isfinite(columns)).tolist():
+        one = Problem(f"parameter {module.p_names[row]}", f"must be finite; it is {columns[row, k]}", code="EG-NUMBER")
+        problems.setdefault(k, []).append(one)
+    if problems and len(problems) == (count := columns.shape[1]):
+        where = f" in run 0, and parameters are refused in all {count} runs" * (count > 1)
+        first = refused_runs(module.info, columns[:, :1]).get(0, problems[0])  # all that is wrong with it
+        raise ParameterError([one._replace(message=one.message + where) for one in first])
     return {k: "; ".join(map(str, one)) for k, one in problems.items()}
 
 
@@ -252,8 +268,8 @@ def _require_one_length(lengths: Mapping[str, int]) -> None:
         raise ill_shaped(f"every (k,) and (n, k) array must have the same number of runs k, not {counts}")
 
 
-def _columns(what: str, raw: Any, names: tuple[str, ...], lengths: dict[str, int]) -> Array:
-    array = _floats(what, raw)
+def _columns(what: str, raw: Any, names: tuple[str, ...], lengths: dict[str, int], finite: bool = True) -> Array:
+    array = _floats(what, raw, finite)
     if array.ndim not in (1, 2) or array.shape[0] != len(names):
         counts = ", ".join(names) or "none"
         raise ill_shaped(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{counts}], not {array.shape}")
@@ -262,8 +278,8 @@ def _columns(what: str, raw: Any, names: tuple[str, ...], lengths: dict[str, int
     return array
 
 
-def _numbers(what: str, raw: Any, lengths: dict[str, int]) -> Any:
-    array = _floats(what, raw)
+def _numbers(what: str, raw: Any, lengths: dict[str, int], finite: bool = True) -> Any:
+    array = _floats(what, raw, finite)
     if array.ndim > 1:
         raise ill_shaped(f"{what} must be a number or have shape (k,), not {array.shape}")
     if array.ndim:
@@ -271,9 +287,9 @@ def _numbers(what: str, raw: Any, lengths: dict[str, int]) -> Any:
     return array if array.ndim else float(array)
 
 
-def _floats(what: str, raw: Any) -> Array:
+def _floats(what: str, raw: Any, finite: bool) -> Array:
     array = np.array(read_numbers(what, raw))
-    if not np.isfinite(array).all():
+    if finite and not np.isfinite(array).all():
         first = np.argwhere(~np.isfinite(array))[0].tolist()
         raise no_number(f"{what} must be finite; entry {first} is {array[tuple(first)]}")
     return array
