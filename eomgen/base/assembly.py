@@ -296,7 +296,7 @@ def describe_contradiction(
     where = ", ".join(f"{labels[i]} {abs(e[i] * row_scales[i]):.3g}/s" for i in order)
     values = ", ".join(f"{name} = {value:.6g}" for name, value in raw.items())
     return (
-        f"{f'the raw velocities {values}' if raw else 'the driven constraints'} are inconsistent with {dof} "
+        f"{f'the given velocities {values}' if raw else 'the driven constraints'} are inconsistent with {dof} "
         f"degree{'s' if dof != 1 else ''} of freedom at this position: the largest residuals are {where}; give fewer "
         "or other velocities"
     )
