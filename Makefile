@@ -44,7 +44,7 @@ lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/mypy
 	@$(BIN)/python tools/lint.py
 
-bench: $(VENV)/.installed-plot
+bench: $(VENV)/.installed-docs
 	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)
 
 docs: $(VENV)/.installed-docs

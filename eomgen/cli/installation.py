@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 
 # -- doctor ------------------------------------------------------------------------------------------------------------
 
-CORE = ("sympy", "numpy", "scipy", "threadpoolctl", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs",
-        "pint")  # fmt: skip
+CORE = ("sympy", "numpy", "scipy", "threadpoolctl", "cython", "jinja2", "click", "ruamel.yaml", "platformdirs", "pint")
 #: extra -> (what it is for, its packages besides those that are always needed)
 EXTRAS = {
     "robots": ("robots in MJCF files", ("mujoco",)),
