@@ -437,18 +437,15 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, E
         return None if result is None else (*result, (None, None))
     if "law" not in e.values:
         e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has, or soil", "EG-MISSING")
-        return None
     law, rubbing = e.part("law"), e.values.get("friction", {})
-    if law is None:
-        return None
-    normal, rigid = law.element_type.read(law), law.element_type is RIGID
+    normal, rigid = (None, False) if law is None else (law.element_type.read(law), law.element_type is RIGID)
     restitution = None
-    if "restitution" in law.values and "restitution" in law.fields:  # judged once
+    if law is not None and "restitution" in law.values and "restitution" in law.fields:  # judged once
         restitution = law["restitution"] if rigid else law.law("restitution", {})
     if not rigid:
         friction = e.read_part("friction")
         return None if normal is None else (normal, friction, (getattr(friction, "dynamic", None), restitution))
-    for key in rubbing.keys() - {"dynamic"}:
+    for key in [key for key in rubbing if key != "dynamic"]:
         why = "has no meaning for rigid bodies, whose friction is a coefficient"
         e.fault(f"friction.{key}", why, "leave it out")
     dynamic, place = FRICTIONS["coulomb"].keys["dynamic"], f"{e.path}.friction.dynamic"
@@ -602,7 +599,7 @@ TYPES = table(
                 dimension=LENGTH,
             ),
             "law": normal_key(CURVED_LAWS | table(RIGID), required=False),
-            "friction": friction_key(FRICTIONS | table(_LUGRE._replace(keys=_LUGRE.keys | LATERAL))),
+            "friction": friction_key(FRICTIONS | table(_LUGRE._replace(keys=_LUGRE.keys | LATERAL)), "dynamic"),
             "soil": SOIL,
         },
         _contact_groups,

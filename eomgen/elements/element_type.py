@@ -116,12 +116,13 @@ class Entry:
         field, values, path = self.fields[key], self.values.get(key), self._at(key)
         if key not in self.values:
             return None
-        if not isinstance(values, Mapping):
-            self.reader.wrong(path, values, field)
-            return None
         assert isinstance(field, Law)
+        if not isinstance(values, Mapping):
+            word = values if isinstance(values, str) and values in field.types else field.preset
+            self.reader.wrong(path, values, field, remedy=f"write {key}: {{type: {word}, ...}}")
+            return None
         preset = "" if "type" in values else field.preset
-        kind = preset or self.reader.type_of(path, values, field.types, key)
+        kind = preset or self.reader.type_of(path, values, field.types, key) or field.preset
         return self.as_law(field, kind, values, path) if kind else None
 
     def as_law(
@@ -133,14 +134,24 @@ class Entry:
         """
         law = Entry(self.reader, self.name, path, dict(values))
         law.owner, law.names, law.element_type, law.fields = self, names or {}, field.types[kind], field.keys_of(kind)
+        others = {name: one for name, one in self.fields.items() if isinstance(one, Law) and one is not field}
+        optional = set[str]()  # in the types to which wrong keys belong
         for key in [key for key in values if key not in law.fields]:
-            types = [name for name, one in field.types.items() if key in one.keys]
+            types = {name: one.keys for name, one in field.types.items() if key in one.keys}
+            homes = [name for name, one in others.items() if key in one.flat]
             if types:
-                law.fault(key, f"belongs to {' and '.join(types)}, and this is {kind}", "leave it out")
+                optional |= {x for x in law.fields if all(x in one and not one[x].required for one in types.values())}
+                if not law.at_fault("type"):
+                    remedy = law.element_type.remedies.get(key, "leave it out")
+                    law.fault(key, f"belongs to {' and '.join(types)}, and this is {kind}", remedy)
+            elif key in others:
+                law.fault(key, "stands beside the law, not in it", f"write {key}: {{...}} beside it")
+            elif homes:
+                law.fault(key, f"belongs to {' and '.join(homes)}", "leave it out")
             else:
                 self.reader.check_names(path, [key], tuple(law.fields))
         for key, one in law.fields.items():
-            if one.required and key not in values:
+            if one.required and key not in values and key not in optional:
                 law.missing(key, f"give the {(self.fields[names.get(key, key)] if names else one).doc}")
         return law
 
@@ -227,7 +238,8 @@ class ElementType(NamedTuple):
     #: Entry -> the element; None where the entry has a fault, which is noted.
     read: Callable[[Entry], Any] = lambda e: None
     one_of: tuple[str, ...] = ()  #: keys of which exactly one is given
-    remedies: Mapping[str, str] = {}  #: what to do instead, for keys that people give something of another kind
+    #: What to do instead, for keys that people give something of another kind, or of a law for keys of other types.
+    remedies: Mapping[str, str] = {}
     ends: tuple[str, str] = ("a", "b")  #: arguments of the method for a key of two markers or joints
     #: The entry's values -> its first-order states, as suffixes of its name, and their units.
     states: Callable[[Mapping[str, Any]], Mapping[str, str]] = lambda values: {}
@@ -298,16 +310,25 @@ def element(
 
 # -- laws --------------------------------------------------------------------------------------------------------------
 class Law(Field):
-    """A mapping {type: ..., key: value, ...} of a law."""
+    """A law {type: ..., key: value, ...}."""
 
     argument, annotation = "mapping", "Mapping[str, Any]"
 
     def __init__(
-        self, doc: str, types: Types, preset: str = "", flat: dict[str, str] | None = None, required: bool = False
+        self,
+        doc: str,
+        types: Types,
+        preset: str = "",
+        flat: dict[str, str] | None = None,
+        required: bool = False,
+        sole: str = "",
     ) -> None:
-        """``preset`` is the type where none is named; ``flat`` are keys of an entry that stand for others of a law."""
+        """``preset`` is the type where none is named; ``flat`` are keys of an entry that stand for others of a law.
+
+        ``sole`` is a key of that type that may stand alone beside some laws.
+        """
         super().__init__(doc, required)
-        self.types, self.preset, renamed = types, preset, flat or {}
+        self.types, self.preset, self.sole, renamed = types, preset, sole, flat or {}
         self.flat = {key: key for one in types.values() for key in one.keys if key not in renamed.values()} | renamed
 
     def keys_of(self, kind: str) -> Fields:
@@ -330,6 +351,8 @@ class Law(Field):
         for names, one in self.rows():
             word = Choice("type of the law", required=self.preset not in names, choices=tuple(names))
             schemas.append(table_schema({"type": word, **one.keys}))
+        if self.sole:
+            schemas.append(table_schema({self.sole: self.types[self.preset].keys[self.sole]}))
         return {"oneOf": schemas, "description": self.doc}
 
     def map(self, value: Any, visitor: Any) -> Any:
@@ -345,6 +368,7 @@ def law(
     doc: str,
     more: Fields | None = None,
     check: Callable[[Entry, dict[str, Any]], None] | None = None,
+    remedies: Mapping[str, str] = {},
 ) -> ElementType:
     """The type of laws whose fields are read from their keys; ``more`` are keys beside these.
 
@@ -358,7 +382,7 @@ def law(
             check(e, values)
         return None if e.at_fault() else kind(**values)
 
-    return ElementType(name, doc, fields | (more or {}), read)
+    return ElementType(name, doc, fields | (more or {}), read, remedies=remedies)
 
 
 def sort_laws(
@@ -372,19 +396,25 @@ def sort_laws(
     rest, parts, places = dict[str, Any](), {key: dict[str, Any]() for key in laws}, dict[str, str]()
     single: list[tuple[str, str, Any]] = []
     for key, value in values.items():
-        if key == "law" and key in laws and isinstance(value, Mapping) and value:
+        if key == "law" and key in laws and isinstance(value, Mapping):
             single += [("law.", one, x) for one, x in value.items()]
-        elif key in laws and isinstance(value, Mapping) and value:
+        elif key in laws and isinstance(value, Mapping):
             parts[key] = dict(value)
         elif any(key in field.flat for field in laws.values()):
             single.append(("", key, value))
         else:
             rest[key] = value
-    present = {key for _, key, _ in single} | {key for key, part in parts.items() if part}
+    mappings = {key for key in laws if isinstance(values.get(key), Mapping)}
+    present = {key for _, key, _ in single} | mappings
     for before, key, value in single:
-        homes = [home for home, field in laws.items() if key in field.flat] or ["law"]
+        homes = [home for home, field in laws.items() if key in field.flat and (field.preset or home in present)]
+        if not homes and not before:  # of a law that is not there
+            rest[key] = value
+            continue
+        if not homes or (before and key in laws and isinstance(value, Mapping)):
+            homes = ["law"]
         home = next((one for one in homes[1:] if one in present), homes[0])
-        name = laws[home].flat.get(key, key)
+        name = key if key in laws and isinstance(value, Mapping) else laws[home].flat.get(key, key)
         if home in rest or name in parts[home]:
             twice(f"{before}{key}")
             continue
@@ -392,5 +422,5 @@ def sort_laws(
         for one, nested in laws[home].flat.items() if home != "law" or not before else ():
             places.setdefault(f"{home}.{nested}", before + one)
         places[f"{home}.{name}"] = f"{before}{key}"
-    result = rest | {key: part for key, part in parts.items() if part}
+    result = rest | {key: part for key, part in parts.items() if part or key in mappings}
     return result, {nested: one for nested, one in places.items() if nested != one}

@@ -6,6 +6,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..elements.element_type import Law
 from ..elements.frames import GROUND
 from ..elements.kinds import Fields
 from .description import DescribedEntry, Faults
@@ -17,19 +18,25 @@ def check_keys(
     path: str, values: Mapping[str, Any], fields: Fields, faults: Faults, of: str = "", others: Container[str] = ()
 ) -> None:
     """Note keys that a table does not know, those of ``others`` as what ``of`` has not, and required ones not given."""
+    laws = {name: field.flat for name, field in fields.items() if isinstance(field, Law)}
+    flat = [key for keys in laws.values() for key in keys]
     for key in values:
-        if key not in fields:
+        if key in flat and key not in fields:
+            home = next(name for name, keys in laws.items() if key in keys)
+            message, remedy = f"belongs to {home}, and there is none", f"leave it out, or give {home}"
+            faults.add(f"{path}.{key}", message, remedy, "EG-CONFLICT")
+        elif key not in fields:
             message = f"{of} has no {key!r}" if key in others else "unknown key"
-            remedy = IN_PLACE_OF_JOINTS if key in SWITCHING and key in others else unknown_key(key, fields)
+            remedy = IN_PLACE_OF_JOINTS if key in SWITCHING and key in others else unknown_key(key, fields, flat)
             faults.add(f"{path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
     for key, field in fields.items():
         if field.required and key not in values:
             faults.missing(f"{path}.{key}", f"give {field.says}")
 
 
-def unknown_key(key: object, fields: Iterable[str]) -> str:
-    """The remedy for a key that a table does not know."""
-    remedy = nearest(str(key), fields, "allowed")
+def unknown_key(key: object, fields: Iterable[str], more: Iterable[str] = ()) -> str:
+    """The remedy for a key that a table does not know; one of ``more`` may be what was meant."""
+    remedy = nearest(str(key), fields, "allowed", more)
     if fault_of_name(key):  # the tail of a text that a comma cut
         remedy += "; inside { } a text with a comma needs quotes"
     return remedy

@@ -335,6 +335,11 @@ def _element(what: str, types: Types, type_name: str) -> Schema:
     schema = typed_schema(types[type_name].fields(what, types), type_name)
     if types[type_name].one_of:
         schema["oneOf"] = [{"required": [key]} for key in types[type_name].one_of]
+    if type_name == "contacts":  # whose friction is a coefficient where bodies are rigid
+        rigid = {"properties": {"type": {"const": "rigid"}}, "required": ["type"]}
+        schema["if"] = {"properties": {"law": rigid}, "required": ["law"]}
+        schema["then"] = {"properties": {"friction": {"maxProperties": 1}}}
+        schema["else"] = {"properties": {"friction": {"minProperties": 2}}}
     return schema
 
 

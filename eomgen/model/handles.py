@@ -12,7 +12,7 @@ from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..expr.records import dataclass
 from ..expr.texts import shown
 from .build_elements import coordinate_names, sketch
-from .description import GROUND_NAME, DescribedEntry, Description, is_zero, items, label_of
+from .description import GROUND_NAME, DescribedEntry, Description, as_written, is_zero, items, label_of
 from .mechanism import velocity_names
 from .names import RATES
 from .quantities import MULTIPLIER, REACTION, WRENCH, Named
@@ -40,7 +40,7 @@ class Described:
             raise at_odds(f"{path} is given in a law and beside it; give it once")
 
         entry = self._description.add(section, require_name(section, name), values, keys, home, twice)
-        self._description.lines[entry.path] = calling_line()
+        self._note_line(as_written(entry.path, self._description.written_paths))
         return entry
 
     def _note_line(self, *paths: str) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import inspect
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, Signature
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -33,6 +33,7 @@ RESULTS: dict[str, tuple[str, Callable[[Described, DescribedEntry], Any]]] = {
     "functions": ("sympy.Function", lambda model, entry: function(entry.name)),
     "bodies": ("BodyHandle", lambda model, entry: BodyHandle(model, entry.name, entry)),
 }
+_BY_KEYWORD = "; give keys of a law by keyword, as exponent=1.5"
 _WIDTH = 108  #: of the text of a method's documentation
 
 
@@ -167,12 +168,20 @@ def method_of(section: str, element: ElementType) -> Callable[..., Any]:
             more = (
                 f"; on the coordinate of a joint use {counterpart}" if hasattr(type(self), counterpart or "-") else ""
             )
+            if laws and "too many" in str(error):
+                more = _BY_KEYWORD
             raise TypeError(f"{element.name}() {error}{more}") from None
         if section not in _HANDLES:
             bound.apply_defaults()
         raw = {key: value for key, value in bound.arguments.items() if value is not None or key in element.ends}
         name, raw = bound.arguments["name"], {key: x for key, x in raw.items() if key not in ("self", "name")}
         single = raw.pop("keys", {}) if laws else {}
+        law, types = raw.get("law", {}), laws[0].types if laws and laws[0].required else None
+        if types and not isinstance(law, Mapping) and not (isinstance(law, str) and law in types):
+            raw["law"] = {"stiffness": law}
+            behind = dict(zip([one.name for one in every], args[1:], strict=False)).get("friction")
+            if behind is not None and not isinstance(behind, Mapping):
+                raise TypeError(f"{element.name}() takes friction behind the stiffness, a mapping{_BY_KEYWORD}")
         values = _entry(self, element, name, raw) if section in _HANDLES else _said(self, element, raw)
         if section in (*_HANDLES, "functions"):
             values = {"type": element.name, **values, **{key: x for key, x in single.items() if x is not None}}

@@ -116,10 +116,10 @@ def listing(known: Iterable[str], most: int = LISTED) -> str:
     return (shown + f", ... ({len(names)} in all)" if len(names) > most else shown) or "none"
 
 
-def nearest(name: str, known: Iterable[str], what: str = "known") -> str:
-    """A remedy for an unknown name: the near miss if there is one, and what is allowed."""
+def nearest(name: str, known: Iterable[str], what: str = "known", more: Iterable[str] = ()) -> str:
+    """A remedy for an unknown name: the near miss if there is one, of ``more`` too, and what is allowed."""
     options = list(known)
-    return joined(hint(name, options), f"{what}: {listing(options)}", by=" ")
+    return joined(hint(name, [*options, *more]), f"{what}: {listing(options)}", by=" ")
 
 
 # -- the one namespace of a model --------------------------------------------------------------------------------------

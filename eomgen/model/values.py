@@ -105,12 +105,14 @@ class Reader:
         result = self.requirements.known([expression])
         return None if result is None else float(result[0])
 
-    def wrong(self, path: str, value: object, kind: kinds.Field | type[kinds.Field], code: str = "EG-TYPE") -> None:
+    def wrong(
+        self, path: str, value: object, kind: kinds.Field | type[kinds.Field], code: str = "EG-TYPE", remedy: str = ""
+    ) -> None:
         """Note that a value is not of a kind."""
         if value is None:
             self.fault(path, "has no value", f"give {kind.says}", "EG-MISSING")
         else:
-            self.fault(path, f"{quoted(value, 80)} is not {kind.says}", code=code)
+            self.fault(path, f"{quoted(value, 80)} is not {kind.says}", remedy, code)
 
     def unknown(self, path: str, what: str, name: object, known: Iterable[str], listed: str) -> None:
         """Note a name that is none of the known ones, which are listed as such."""

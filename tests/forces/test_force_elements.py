@@ -409,6 +409,7 @@ def test_faults_of_laws_are_reported_together() -> None:
     m.friction("f2", "s", coulomb=1)
     m.friction("f3", "s", coulomb=1, smoothing="small")
     m.friction("f4", "s", coulomb=1, smoothing=0.1, static=2)
+    m.friction("f5", "s", friction_law="brown_mcphee", transition=1)
     m.stop("s1", "s", stiffness=1)
     m.stop("s2", "s", stiffness=-1, lower=1, upper=0, exponent=0.5)
     m.point_plane("c1", m.ground, b, stiffness=1, restitution=0.5)
@@ -425,6 +426,7 @@ def test_faults_of_laws_are_reported_together() -> None:
     told = {path.removeprefix("forces."): text for path, text in problems(m).items()}
     expected = {
         "f2.smoothing": "is missing", "f3.smoothing": "is -0.1", "f4.stribeck": "is missing",
+        "f5.friction_law": "give coulomb, or leave friction_law out", "f5.transition": "is given without coulomb",
         "s1": "has no limit", "s2.stiffness": "is -1", "s2.upper": "this is upper - lower", "s2.exponent": "is 0.5",
         "c1.velocity": "give restitution and velocity together", "c2.restitution": "is 1.5",
         "c3.formula": "dissipation is given too", "c4.friction": "is missing",

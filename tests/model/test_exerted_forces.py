@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_files import load
+from model_files import load, schema_faults
 from refusals import refuses
 
 import eomgen as eg
@@ -200,6 +200,12 @@ FAULTS = [
     (LAST, LAST + "\n    friction: 0.2", "EG-MISSING contacts.among.smoothing"),
     (LAST, LAST + "\n    soil: {type: dry_sand}", "EG-CONFLICT contacts.among.law.stiffness soil"),
     (LAST, "soil: {type: dry_sent}", "EG-CHOICE contacts.among.soil.type 'dry_sand'?"),
+    (LAST, "law: hertz", "EG-TYPE contacts.among.law hertz, ...}"),
+    (LAST, LAST + "\n    stifness: 1", "EG-NAME-UNKNOWN contacts.among.stifness 'stiffness'?"),
+    (LAST, "law: {stiffness: 1, friction: {dynamic: 1}}", "EG-CONFLICT contacts.among.law.friction beside"),
+    (LAST, "law: {stiffness: 1, cohesion: 1}", "EG-CONFLICT contacts.among.law.cohesion soil"),
+    (LAST, "stiffness: 1\n    damping: 1", "EG-CONFLICT contacts.among.damping 18 dissipation"),
+    (LAST, "stiffness: 1\n    lateral: false\n    rebound: 1", "EG-CONFLICT contacts.among.rebound 19 soil"),
     (LAST, "law: {stiffness: r}", "EG-DIMENSION contacts.among.law.stiffness"),
     (BOXES, BOXES.replace("[a, b]", "a"), "EG-CONFLICT contacts.among"),
     (BOXES, POINTS.format("[[0, 0], [1, 0], [0.2, 0.2], [0, 1]]"), "EG-RANGE contacts.among.first[0].points"),
@@ -211,6 +217,27 @@ FAULTS = [
 def test_faults_of_files(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in FILE
     refuses(message, lambda: load(tmp_path, FILE.replace(old, new), "heap.yaml").check())
+
+
+ALL_AT_ONCE = [
+    ("stiffness: 1\n    cohesion: 1", "cohesion"),
+    ("moduli: [1, 1]\n    poisson: [0.3, 0.3]", "moduli poisson"),
+    ("normal_law: foo\n    moduli: 3\n    poisson: -1", "normal_law"),
+    ("normal_law: foo\n    stiffness: -1\n    velocity: -1", "restitution normal_law stiffness velocity"),
+    ("stiffness: 1\n    friction_law: foo\n    friction: -1", "smoothing friction_law friction"),
+    ("friction: -1\n    smoothing: -1", " friction smoothing"),
+    ("law: 3\n    friction: {dynamic: -1, smoothing: 1}", "law friction.dynamic"),
+    ("law: {type: rigid}\n    friction: {viscous: 1, static: 1, type: coulomb, stribeck: 1}",
+     "friction.viscous friction.static friction.type friction.stribeck"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("writing", "keys"), ALL_AT_ONCE)
+def test_all_faults_of_laws_are_reported_in_order_at_their_keys(tmp_path: Path, writing: str, keys: str) -> None:
+    with pytest.raises(eg.ModelError) as caught:
+        load(tmp_path, FILE.replace(LAST, writing)).check()
+    places = [f"contacts.among.{key}".removesuffix(".") for key in keys.split(" ")]
+    assert [problem.path for problem in caught.value.problems] == places
 
 
 TOGETHER = "law: {stiffness: 1e5, dissipation: 0.3, friction: mu, smoothing: 0.001}"
@@ -268,7 +295,60 @@ def test_keys_one_by_one_are_those_of_laws(single: dict[str, Any], parts: dict[s
             shape = {"shape": "plate", "length": 0.3, "width": 0.2}
         m.contacts("floor", {**shape, "on": body}, {"shape": "half_plane", "on": m.ground}, **keys)
         digests.add(m.compile(target="numpy", kernels=["poses"]).metadata["model_digest"])
+        assert schema_faults(m) == []
     assert len(digests) == 1
+
+
+def test_a_stiffness_may_stand_in_the_place_of_its_law() -> None:
+    digests = list[list[str]]()
+    for k in (3e5, {"stiffness": 3e5}):
+        digests.append([])
+        for kind, *rest in (("point_plane", k), ("sphere_plane", 0.1, k), ("sphere_sphere", (0.1, 0.2), k)):
+            m = eg.Model("w")
+            ball = m.body("ball", mass=1, inertia=(1, 1, 1))
+            m.free("j", m.ground, ball)
+            getattr(m, kind)("t", m.ground, ball, *rest, friction=0.3, smoothing=1e-3)
+            m.revolute("r", ball, m.body("arm", mass=1, inertia=(1, 1, 1)))
+            m.stop("s", "r", k, 0, 2.6)
+            m.point_plane("u", m.ground, ball, law={}, stiffness=3)
+            digests[-1].append(m.compile(target="numpy", kernels=["poses"]).metadata["model_digest"])
+    assert digests[0] == digests[1]
+    with pytest.raises(TypeError, match=r"friction behind the stiffness, a mapping; give keys of a law by keyword"):
+        m.point_plane("v", m.ground, ball, 1e6, 1.5)
+    with pytest.raises(TypeError, match=r"too many .*; give keys of a law by keyword"):
+        m.point_plane("v", m.ground, ball, 1e6, 1.5, 0.2)
+
+
+def test_the_schema_knows_the_friction_of_rigid_bodies() -> None:
+    for law, friction, places in (
+        ("rigid", "{dynamic: 0.3}", []),
+        ("rigid", "{dynamic: 0.3, smoothing: 1}", ["contacts.among.friction"]),
+        ("linear, stiffness: 1", "{dynamic: 0.3, smoothing: 1}", []),
+        ("linear, stiffness: 1", "{dynamic: 0.3}", ["contacts.among.friction"]),
+    ):
+        text = FILE.replace(TOGETHER, LAST).replace(
+            LAST + "\ninitial", f"law: {{type: {law}}}\n    friction: {friction}\ninitial"
+        )
+        assert schema_faults(text) == places
+
+
+def test_faults_of_contacts_in_python_are_reported_at_the_line_of_the_call() -> None:
+    m = eg.Model("w")
+    ball = m.body("ball", mass=1, inertia=(1, 1, 1))
+    m.free("j", m.ground, ball)
+    m.point_plane("first", m.ground, ball, "zz")
+    m.contacts(
+        "floor",
+        {"shape": "sphere", "radius": 1, "on": ball},
+        {"shape": "half_space", "on": m.ground},
+        {"stiffness": "zz"},
+    )
+    with pytest.raises(eg.ModelError) as caught:
+        m.check()
+    one, two = caught.value.problems
+    assert (one.path, two.path) == ("forces.first.law.stiffness", "contacts.floor.law.stiffness")
+    assert (two.file, two.line) == (one.file, one.line + 1)
+    assert one.file == __file__
 
 
 @pytest.mark.parametrize(

@@ -127,6 +127,9 @@ def test_forces_of_rigid_contacts_as_outputs(asked: str) -> None:
     m.planar("j", m.ground, body)
     m.contacts("c", {**SHAPES["circle"], "on": body}, {"shape": "half_plane", "on": m.ground}, rigid(friction=0.3))
     run = m.compile(target="numpy").simulate(0.01, {"j_y": 0.5}, method="moreau", step=1e-3, contact_forces=True)
+    with refused("EG-UNSUPPORTED impulses FMU", eg.ModelError) as caught:
+        m.derive().write_fmu("asked.fmu")
+    assert [problem.path for problem in caught.value.problems] == ["contacts.c"]  # whatever its law is called there
     m.output("f", asked)
     with refused(
         "EG-UNSUPPORTED outputs.f.expression run.contact_forces.on(BODY)" + " normal(c)" * ("on=" not in asked)

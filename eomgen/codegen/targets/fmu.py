@@ -57,7 +57,7 @@ def refuse_impacts(program: Program, holder: str = "an FMU") -> None:
     ]
     problems += [
         Problem(
-            f"contacts.{name}.law.type",
+            f"contacts.{name}",
             f"rigid contacts exert impulses, which {holder} cannot hold",
             "choose another law",
             code="EG-UNSUPPORTED",

@@ -409,11 +409,11 @@ FRICTIONS = table(
 )
 
 
-def friction_key(types: Types) -> Law:
-    """The key of a law of friction of a contact."""
+def friction_key(types: Types, sole: str = "") -> Law:
+    """The key of a law of friction of a contact; ``sole`` is what rigid bodies have of it."""
     flat = {"friction_law": "type", "friction": "dynamic", "static_friction": "static", "viscous_friction": "viscous"}
     bristles = {"bristle_stiffness": "stiffness", "bristle_damping": "damping"}
-    return Law("law of friction", types, "coulomb", flat | bristles)
+    return Law("law of friction", types, "coulomb", flat | bristles, sole=sole)
 
 
 FRICTION = friction_key(FRICTIONS)
@@ -603,7 +603,10 @@ def _joint_friction(e: Entry) -> Force | None:
             e.fault(one, "is given without coefficient", f"give coefficient, or leave {one} out", "EG-MISSING")
     names = {key: name or key for key, name in _IN_JOINT.items()}
     values = {key: e.values[name] for key, name in names.items() if name in e.values}
-    if values.keys() - {"viscous"}:
+    if "coulomb" not in e.values:
+        for one in [names[key] for key in values if key != "viscous"]:
+            e.fault(one, "is given without coulomb", f"give coulomb, or leave {one} out", "EG-MISSING")
+    else:
         law = e.as_law(FRICTION, e["friction_law"], values, e.path, names)
         dry = law.element_type.read(law)
         return None if path is None or dry is None else JointFriction(e.name, path, dry)

@@ -299,9 +299,12 @@ def _hertz(e: Entry) -> HuntCrossley | None:
 
 def _hertz_law(elastic: Fields) -> ElementType:
     keys = {"stiffness": _STIFFNESS.replace(required=False), "dissipation": DISSIPATION, **IMPACT}
-    return ElementType("hertz", "the same with the exponent 3/2.", keys | elastic, _hertz)
+    remedies = _REMEDIES | {"exponent": "leave it out; it is 3/2"}
+    return ElementType("hertz", "the same with the exponent 3/2.", keys | elastic, _hertz, remedies=remedies)
 
 
+_BY_MODULI = dict.fromkeys(ELASTIC, "choose the type hertz, or give stiffness instead")
+_REMEDIES = {"damping": "leave it out; the dissipation is damping / stiffness", **_BY_MODULI}
 _LAWS = table(
     law(
         HuntCrossley,
@@ -309,9 +312,10 @@ _LAWS = table(
         "k d**n max(0, 1 + dissipation d_dot) of the penetration d.",
         IMPACT,
         _check_dissipation,
+        _REMEDIES,
     ),
     _hertz_law({}),
-    law(DampedLinear, "linear", "max(0, k d + c d_dot)."),
+    law(DampedLinear, "linear", "max(0, k d + c d_dot).", remedies=_BY_MODULI),
 )
 #: Where radii are known.
 CURVED_LAWS = _LAWS | table(_hertz_law(ELASTIC))
