@@ -64,6 +64,7 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
     check = _Check(reader.graph, names)
     kinds = {c: k.kind for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True)}
     kinds |= {j.name: j.joint.coordinates[0].kind for j in joints if len(j.coordinates) == 1}
+    moved = {*kinds, *(j.name for j in joints)}
     wrong = _check_bindings(reader, check)
     for path, expression, local in reader.expressions:
         if reader.faults.under(path) or (wrong and _takes_in(reader, wrong, path, expression)):
@@ -77,12 +78,16 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
             values = {} if entry is None else entry.values
             return acts_on_length(section, values, row, lambda name: kinds.get(name) == "length")
 
+        def lost(row: Field, section: str = section, entry: Any = entry) -> bool:  # what it acts on is not known
+            own = entry.values if section in ("forces", "constraints") and entry is not None else {}
+            return any(str(own[key]) not in moved for key in (row.along, "coordinate") if own.get(key) is not None)
+
         for word, row in field.local.items() if field is not None and local else ():
             if word in local:
-                own = row.measured_in({}, (), length(row))
+                own = None if lost(row) else row.measured_in({}, (), length(row))
                 check.known[local[word].id] = Known(own)
         numbers = tuple(step if isinstance(step, str) else int(step) for step in steps[1:])
-        wanted = None if field is None else field.measured_in(values, numbers, length(field))
+        wanted = None if field is None or lost(field) else field.measured_in(values, numbers, length(field))
         if section in ("outputs", "inputs") and entry is not None and entry.path in units:
             wanted = units[entry.path].dimension
         if section == "states" and entry is not None and entry.path in units and steps[0] not in ("period", "offset"):

@@ -8,7 +8,7 @@ SymPy expressions as the user gave them.  Nothing is looked up or judged here; t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -230,10 +230,16 @@ class Faults:
                 result.setdefault((path, problem.message), (problem._replace(path=path), []))
             elif not any(_gives(origin, place) and problem.message.startswith(message) for place, message in attached):
                 path = origin.place + problem.path[len(own) :]
-                alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
+                alike = problem.message.replace(origin.prefix, "") if origin.prefix else problem.message
                 first = problem._replace(path=path)
-                result.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
+                result.setdefault((path, alike, *problem[3:]), (first, []))[1].append(origin.instance)
         return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in result.values()]
+
+    def names_at(self, path: str, names: Iterable[str]) -> list[str]:
+        """The names as an entry may write them: of one that an instance brought, those of its component."""
+        origin = self.origin_of(path)[1]
+        own = "" if origin is None else origin.prefix
+        return [name.removeprefix(own) for name in names if name.startswith(own) or name in (GROUND_NAME, "t")]
 
     def origin_of(self, path: str) -> tuple[str, Origin | None]:
         """The part of a path that an instance brought, and where that comes from."""

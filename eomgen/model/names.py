@@ -268,7 +268,8 @@ class Scope:
             self.reader.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:
-            known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level), "pi"]
+            known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
+            known = [*self.local, *self.names.faults.names_at(self.path, known), "pi"]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy, "EG-NAME-UNKNOWN")
         elif LEVELS[kind] > self.level:

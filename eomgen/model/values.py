@@ -116,7 +116,8 @@ class Reader:
 
     def unknown(self, path: str, what: str, name: object, known: Iterable[str], listed: str) -> None:
         """Note a name that is none of the known ones, which are listed as such."""
-        self.fault(path, f"no {what} {quoted(name)}", nearest(shown(name), known, listed), "EG-NAME-UNKNOWN")
+        remedy = nearest(shown(name), self.faults.names_at(path, known), listed)
+        self.fault(path, f"no {what} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
 
     def type_of(self, path: str, values: Mapping[str, Any], types: Iterable[str], what: str, key: str = "type") -> str:
         """The type that an entry names, one of a table; empty where it is none, which is noted."""
@@ -329,7 +330,7 @@ class Reader:
             raise ExpressionError(*self.unknown_marker(label), code="EG-NAME-UNKNOWN")
         return result
 
-    def unknown_marker(self, label: str) -> tuple[str, int, str]:
+    def unknown_marker(self, label: str, path: str = "") -> tuple[str, int, str]:
         """Message, column (none) and remedy for a marker that does not exist."""
         body, dot, name = label.partition(".")
         if body in self.bodies and dot:
@@ -337,7 +338,7 @@ class Reader:
             near = hint(name, own)
             have = ", ".join(own) or "none"
             return f"{body!r} has no marker {name!r}", 0, " ".join(x for x in (near, f"its markers: {have}") if x)
-        return f"no body {body!r}", 0, nearest(body, self.bodies, "bodies")
+        return f"no body {body!r}", 0, nearest(body, self.faults.names_at(path, self.bodies), "bodies")
 
     def marker(self, path: str, value: Any) -> Marker | None:
         """A marker from a reference: ``rod``, ``rod.tip``, ``ground`` or a mapping of body, at, rpy."""
@@ -345,7 +346,7 @@ class Reader:
             result = self.markers.get(value)
             body = value.partition(".")[0]
             if result is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
-                message, _, remedy = self.unknown_marker(value)
+                message, _, remedy = self.unknown_marker(value, path)
                 self.fault(path, message, remedy, "EG-NAME-UNKNOWN")
             return result
         if not isinstance(value, Mapping):

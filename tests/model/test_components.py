@@ -389,6 +389,34 @@ def test_faults_in_the_file_of_a_component(folder: Path, old: str, new: str, tol
         load(folder, ARM, "arm.yaml").check()
 
 
+def test_a_fault_of_a_component_comes_once_and_in_its_names(tmp_path: Path) -> None:
+    """Also where an instance has no joint, whose force then has no dimension to be wrong."""
+    text = """name: m
+components:
+  hanger:
+    attachments: [top]
+    parameters: {k: {value: 100, unit: N/m}}
+    bodies: {bob: {mass: 1, markers: {tip: [0, 0, 1]}}}
+    joints: {slide: {type: prismatic, between: [top, bob], axis: x}, turn: {type: revolute, between: [tap, bob]}}
+    forces:
+      a: {type: joint_spring, joint: slide, stiffness: k}
+      b: {type: joint_spring, joint: slid, stiffness: k}
+      c: {type: torque, joint: turn, value: kk}
+      d: {type: torque, joint: slide, value: force(e)}
+add:
+  h1: {component: hanger, at: ground}
+  h2: {component: hanger, at: grund}
+"""
+    with refused("EG-NAME-UNKNOWN components.hanger.forces.b.joint: (in h1, h2); 'slide'? slide, turn") as caught:
+        load(tmp_path, text).check()
+    told = [f"{one.path}: {one.message}; {one.remedy}" for one in caught.value.problems]
+    assert len(told) == 5, told
+    assert told[0].endswith("between[0]: no body 'tap' (in h1, h2); bodies: ground, bob")
+    assert "'kk' (in h1, h2); did you mean 'k'? known here: t, k, slide, " in told[2]
+    assert "no force element 'h1_e' in column 7 of 'force(h1_e)' (in h1, h2); " in told[3]
+    assert told[4].startswith("add.h2.at.top: no body 'grund'")
+
+
 @pytest.mark.parametrize(("at", "told"), [("groundd", "NAME-UNKNOWN :"), ("{body: ground, at: [1]}", "TYPE .at:")])
 def test_faults_of_what_shapes_are_on(tmp_path: Path, at: str, told: str) -> None:
     text = """name: m
