@@ -151,6 +151,16 @@ def test_packages_say_whence_they_are_and_whose(target: str, tmp_path: Path) -> 
         project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
         assert project["description"].startswith('It says """hello"""')
         assert (folder / "py.typed").exists()
+        unbuilt = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import swing"
+        done = subprocess.run([sys.executable, "-c", unbuilt], capture_output=True, text=True, check=False)
+        assert done.stderr.endswith(f"; build and install the package first: pip install {folder}\n")
+    if target == "c":  # as its README says for processors without an operating system, beside a program
+        words = re.findall(r"`([^`]*)`", next(line for line in text.splitlines() if "gc-sections" in line))
+        assert words[:2] == ["*.c", "swing_real_time.c"]
+        (folder / words[1]).unlink()
+        (folder / "main.c").write_text("int main(void) { return 0; }\n")
+        sources = [file.name for file in folder.glob(words[0])]
+        subprocess.run(["gcc", *words[-2].split(), words[-1], *sources, "-lm", "-o", "swing"], cwd=folder, check=True)
 
 
 @pytest.mark.thorough
