@@ -351,7 +351,9 @@ class Source:
     ] = ()
     target: str = "cython"
     settings: Annotated[
-        Texts, "NAME=VALUE: Value of a parameter, an input, a coordinate or a rate; repeat it for more."
+        Texts,
+        "NAME=VALUE: Value of a parameter, an input, a coordinate or a rate in SI units, or of an output in its "
+        "own unit; repeat it for more.",
     ] = ()
     robot: Robot = Robot()
 

@@ -178,7 +178,8 @@ def simulate(
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
     **options
-        Passed on to the solver; unknown ones are an error for SciPy's methods.  Of moreau ``contact_tolerance``,
+        Passed on to the solver; unknown ones are an error for SciPy's methods.  Of moreau ``contact_tolerance``, the
+        residual of the contact laws (m/s) divided by the largest velocity in the contacts of a step,
         ``contact_iterations`` and ``contact_forces``, True to keep the force of each contact.
 
     Returns
