@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
+from ..base.names import closest
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import Law
 from ..elements.frames import GROUND
@@ -30,7 +31,8 @@ def check_keys(
             remedy = IN_PLACE_OF_JOINTS if key in SWITCHING and key in others else unknown_key(key, fields, flat)
             faults.add(f"{path}.{key}", message, remedy, "EG-NAME-UNKNOWN")
     for key, field in fields.items():
-        if field.required and key not in values:
+        meant = (closest(one, fields) == [key] for one in values if one not in fields)
+        if field.required and key not in values and not any(meant):
             faults.missing(f"{path}.{key}", f"give {field.says}")
 
 

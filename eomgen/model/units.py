@@ -187,7 +187,7 @@ def _looked_up(word: str, text: str) -> tuple[Dimension, float, bool]:
         raise UnitError(unknown, "write N*m for a torque; " + _FORM)
     if not one._is_multiplicative:
         raise UnitError(
-            f"{quoted(word)}{of} has a zero point of its own, so it cannot be multiplied",
+            f"{quoted(word)}{of} has a zero point of its own",
             "give the temperature in K" if "[temperature]" in dict(unit.dimensionality) else "give it in an SI unit",
         )
     dimension = dimensions.NONE

@@ -188,7 +188,7 @@ def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float])
 
 
 def _mobility(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
-    """The mobility; a loop that does not close is reported at its joint's place in the description."""
+    """The mobility; a loop that does not close is reported at its joint's place, or that of initial."""
     try:
         return find_mobility(kinematics, independent)
     except AssemblyError as error:
@@ -197,6 +197,8 @@ def _mobility(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
         places = [f"joints.{j.name}" for j in mechanism.joints if j.name in names]
         places += [f"constraints.{c.name}" for c in mechanism.constraints if c.name in names]
         place = min(places, key=lambda place: names.index(place.partition(".")[2]), default=None)
+        if str(error).startswith("the given values"):  # more than there are degrees of freedom
+            place = "initial"
         if place is None:
             raise
         raise AssemblyError(str(mechanism.problem(place, str(error))), error.rows, error.code) from None

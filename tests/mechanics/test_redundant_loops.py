@@ -75,7 +75,8 @@ def test_a_loop_that_cannot_close_is_an_error_at_its_joint(tmp_path: Path) -> No
 def test_inconsistent_initial_values_are_an_error(tmp_path: Path, module: Callable[..., Any]) -> None:
     file = tmp_path / "given.yaml"
     file.write_text(FOUR_BAR.replace("initial: {theta: pi/3,", "initial: {theta: pi/3, psi: 2.0,"), encoding="utf-8")
-    refuses("EG-LOOP-OPEN psi", lambda: eg.load(file).derive())
+    line = next(k for k, text in enumerate(FOUR_BAR.splitlines(), start=1) if text.startswith("initial: "))
+    refuses(f"EG-LOOP-OPEN {file}:{line}: initial: psi", lambda: eg.load(file).derive())
     mod = module("four_bar")
     refuses("EG-LOOP-OPEN theta psi 2.5", mod.x0, theta=1.0, psi=2.5)
     refuses("EG-CONTRADICTION theta_dot psi_dot", mod.x0, theta=1.0, theta_dot=10.0, psi_dot=0.0)

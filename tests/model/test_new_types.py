@@ -162,7 +162,7 @@ def test_its_keys_are_judged_by_their_kinds(keys: dict[str, Any], code: str, pat
 
 
 def test_type_checkers_know_all_of_them() -> None:
-    stub = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "stubs.py"))["stub"]()
+    stub = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "stubs.py"))["element_stub"]()
     ends = "self, name: str, a: Any, b: Any, stiffness: Value"
     assert f"def hardening_spring({ends}, hardening: Value = 0, share: float = 100" in " ".join(stub.split())
     assert "def slanted(self, name: str, predecessor: Any, successor: Any, slope: Value" in stub
