@@ -11,7 +11,7 @@ from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
 from ..contact.pair_features import CHOSEN, OTHER, OWN, PIECE
 from ..contact.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
 from ..contact.pairs import PairFunction, PairKind, PairPart
-from ..expr.core import symbols_of
+from ..expr.core import Expr, symbols_of
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .files import render
@@ -267,8 +267,9 @@ def _law(
         number += len(kind.law) * (letter == "s")
         places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
     inner = replace(program, graph=graph)
-    pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1)
-    return print_pieces(inner, name, pieces, places).text, used_helpers(inner, outputs)
+    guards = [Expr(graph, i) for i in kind.meets if part in ("outputs", "slopes")]
+    pieces = cut(graph, outputs, (), frozenset(), len(graph.nodes) + 1, guards=guards)
+    return print_pieces(inner, name, pieces, places).text, used_helpers(inner, [*outputs, *guards])
 
 
 def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:

@@ -11,7 +11,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
-from .limits import ASIDE, COMMON, EQUAL, FOCAL, NEAREST, NOWHERE, POLISHED, TWICE, UNIQUE
+from .limits import ASIDE, BACK, COMMON, EQUAL, FOCAL, NEAREST, NOWHERE, PLAIN, POLISHED, TWICE, UNIQUE
 from .point import Contact, Touch
 from .rounds import along_axis, direction, seen_from, settled
 
@@ -275,8 +275,11 @@ class EllipsoidEllipsoid(Contact):
         apart = graph.apply("lt", 0.0, vec.dot(reach, reach))
         x, y, z = (where(apart, a, b) for a, b in zip(reach, along_axis(view, self.first, 0), strict=True))
         n = self._begin(forms, (x, y, z))
-        for _ in range(COMMON - 1):
-            n = self._rising_step(forms, reach, n)
+        before, most = n, -NOWHERE * graph.one
+        for _ in range(COMMON - PLAIN):
+            n, before, most = self._rising_step(forms, reach, n, before, most)
+        for _ in range(PLAIN - 1):
+            n = self._step(forms, reach, n)[0]
         x, y, z = n
         n = self._step(forms, reach, (settled(view, x), settled(view, y), settled(view, z)))[0]
         own, other = (vec.times(B, n) for B in forms)
@@ -294,20 +297,16 @@ class EllipsoidEllipsoid(Contact):
         size = sqrt(x * x + y * y + z * z)
         return x / size, y / size, z / size
 
-    def _rising_step(self, forms: list[Mat3], reach: Vec3, n: Vec3) -> Vec3:
-        """A step; a half or a quarter of one that is so long that the gap gets less, where it is less less."""
-        graph = reach[0].graph
-        best, before = self._step(forms, reach, n)
-        way, most = vec.sub(best, n), _gap(forms, reach, best)
-        falls = graph.apply("lt", most, before)
-        for part in (0.5, 0.25):
-            tried = direction(vec.add(n, vec.scale(part * graph.one, way)), n)[0]
-            gap = _gap(forms, reach, tried)
-            better = graph.apply("and", falls, graph.apply("lt", most, gap))
-            most = where(better, gap, most)
-            x, y, z = (where(better, a, b) for a, b in zip(tried, best, strict=True))
-            best = (x, y, z)
-        return best
+    def _rising_step(
+        self, forms: list[Mat3], reach: Vec3, n: Vec3, before: Vec3, most: Expr
+    ) -> tuple[Vec3, Vec3, Expr]:
+        """A step, or back on the last one where it was so long that the gap got less than the most before it."""
+        step, gap = self._step(forms, reach, n)
+        falls = gap.graph.apply("lt", gap, most)
+        back = direction(vec.add(before, vec.scale(BACK * gap.graph.one, vec.sub(n, before))), n)[0]
+        x, y, z = (where(falls, a, b) for a, b in zip(back, step, strict=True))
+        p, q, r = (where(falls, a, b) for a, b in zip(before, n, strict=True))
+        return (x, y, z), (p, q, r), where(falls, most, gap)
 
     @staticmethod
     def _step(forms: list[Mat3], reach: Vec3, n: Vec3) -> tuple[Vec3, Expr]:
@@ -331,11 +330,6 @@ class EllipsoidEllipsoid(Contact):
         good = graph.apply("and", graph.apply("lt", _TOO_BENT * det0, det), graph.apply("lt", 0.0, trace))
         x, y, z = (a + where(good, p, q) / where(good, det, det0) for a, p, q in zip(n, way, plain, strict=True))
         return direction((x, y, z), n)[0], rise
-
-
-def _gap(forms: list[Mat3], reach: Vec3, n: Vec3) -> Expr:
-    """How far two ellipsoids are apart along a direction."""
-    return reduce(lambda gap, B: gap - sqrt(vec.dot(n, vec.times(B, n))), forms, vec.dot(n, reach))
 
 
 # -- cuboids -----------------------------------------------------------------------------------------------------------

@@ -295,7 +295,8 @@ class ContactGroups(Force):
 _ENDS = {
     **dict.fromkeys(
         ("profile", "smooth_profile"),
-        "a shape is deeper below the profile than its depth: make the law stiffer or the depth greater",
+        "a shape is deeper below the profile than its depth: make the law stiffer or the depth greater, or "
+        "smaller for a body that belongs below",
     ),
     "ellipsoid": "an ellipsoid is so deep in another solid that its nearest place is not unique: make the law stiffer",
     FIELD_SHAPE: "a shape lies in a hollow of the height field that is sharper than itself: make the shape smaller",

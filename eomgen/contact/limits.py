@@ -66,10 +66,13 @@ FOLLOWED = 0.005
 #: the stiffness of that place has no limit.  Measured up to here on 4,800 random pairs each with known normals and half
 #: axes of up to 10 : 1: depths are right to 1e-9 in all.
 UNIQUE = 0.95
-#: Steps of Newton's method for the common normal of two ellipsoids, of which long ones go back to a half or a quarter,
-#: and before these towards the normal at which ellipsoids scaled by one factor touch.  Measured on 68,000 random pairs
-#: up to UNIQUE, half axes of 10 : 1 : 1 among them: all depths are right to 1e-9; with 14 and 2 those of all but one.
-COMMON, TWICE = 15, 3
+#: Steps of Newton's method for the common normal of two ellipsoids, the last of them that do not go back, and before
+#: these towards the normal at which ellipsoids scaled by one factor touch.  Measured on 280,000 random pairs of up to
+#: 0.94 of the unique depth, half axes of 10 : 1 : 1 among them: all depths are right to 1e-15, with one step less to
+#: 3e-11; 12 steps that never go back leave 3 % undefined or wrong.
+COMMON, PLAIN, TWICE = 15, 2, 3
+#: Part of a step of these that is left where the gap fell in it.
+BACK = 0.4
 #: Square of the part of the size of two ellipsoids by which their deepest points may lie beside their common normal:
 #: depths have errors of about this square.
 ASIDE = 1e-8

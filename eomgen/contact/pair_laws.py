@@ -25,7 +25,18 @@ from .pairs import PairKind
 from .point import Contact, SpherePlane, joint_radius
 from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, EdgeRound, HollowArcRound, InnerCornerRound, InsideRound, ProfilePiece
-from .rounds import AtHeight, BlockRound, EdgeEdge, EdgeRod, PolygonRound, RodCorner, RodRod, RoundRound, SegmentRound
+from .rounds import (
+    AtHeight,
+    BlockRound,
+    EdgeEdge,
+    EdgeRod,
+    PolygonRound,
+    RodCorner,
+    RodRod,
+    RoundRound,
+    SegmentRound,
+    SharedEnergy,
+)
 from .shapes import SHAPES, WHOLE_PLATE, greatest
 from .soil_beds import SoilCell
 from .soil_wheels import SoilWheel
@@ -405,10 +416,11 @@ def pair_kind(
     symbols += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
     seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in symbols}
     counts = [len(result) for result in (results, results, touch, witnesses)]
-    every = pair.unsettled([*results, *jvp(results, seeds), *touch, *witnesses])
+    meets = [graph.apply("lt", 0.0, contact.touch(view)[1])] if isinstance(contact, SharedEnergy) and not held else []
+    every = pair.unsettled([*results, *jvp(results, seeds), *touch, *witnesses, *meets])
     starts = [0, *itertools.accumulate(counts)]
     results, slopes, touch, witnesses = (every[a:b] for a, b in itertools.pairwise(starts))
-    nodes, renamed = _kept(graph, [*results, *slopes, *touch, *witnesses])
+    nodes, renamed = _kept(graph, every)
     ids, seen, met = ([renamed[x.id] for x in result] for result in ((*results, *slopes), touch, witnesses))
     return PairKind(
         f"{kinds[0]}_{kinds[1]}_{tables[0]}_{tables[1]}",
@@ -427,6 +439,7 @@ def pair_kind(
             (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})
         ),
         corners=corners,
+        meets=tuple(renamed[x.id] for x in every[starts[-1] :]),
     )
 
 

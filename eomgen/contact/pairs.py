@@ -63,6 +63,8 @@ class PairKind:
     thin : int
         1 where the first has a far side though no bounds, so that no step may pass it; 2 where a point of the second
         may, so that its thickness alone limits steps.
+    meets : tuple of int
+        A node that is 0 where nothing is exerted, before costly laws; none of others.
     lines : tuple of (start, count)
         Of first shapes that are columns of soil: rows of the first table that stand in line along their x axis, each
         its first size farther than the one before.  Columns reach down without end, so that what is below their top
@@ -85,6 +87,7 @@ class PairKind:
     calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
     corners: tuple[int, ...] = ()
     thin: int = 0
+    meets: tuple[int, ...] = ()
     lines: tuple[tuple[int, int], ...] = ()
 
     def graph(self) -> Graph:

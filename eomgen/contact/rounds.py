@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from abc import abstractmethod
 from collections.abc import Sequence
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 
 from ..elements.forces.force import View, where
@@ -13,7 +13,7 @@ from ..elements.forces.normal_laws import NormalLaw
 from ..elements.frames import Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.differentiate import jvp
+from ..expr.differentiate import gradient
 from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .limits import PARALLEL
@@ -248,15 +248,10 @@ class SharedEnergy(Contact):
 
     def _change(self, view: View) -> tuple[Vec3, Vec3]:
         """How the share changes as the second body moves along axes of the ground, and as it turns about them."""
-        graph, share = view.graph, self.share(view)
-        axes = vec.identity(graph)
-        place, columns = view.position(self.second), vec.transpose(view.rotation(self.second))
-        moved = [jvp([share], {p: graph.one})[0] for p in place]
-        turned = []
-        for axis in axes:
-            seeds = {x: d for column in columns for x, d in zip(column, vec.cross(axis, column), strict=True)}
-            turned.append(jvp([share], seeds)[0])
-        return (moved[0], moved[1], moved[2]), (turned[0], turned[1], turned[2])
+        columns = vec.transpose(view.rotation(self.second))
+        x, y, z, *slopes = gradient(self.share(view), [*view.position(self.second), *itertools.chain(*columns)])
+        by_columns = [(slopes[k], slopes[k + 1], slopes[k + 2]) for k in (0, 3, 6)]
+        return (x, y, z), reduce(vec.add, map(vec.cross, columns, by_columns))
 
     def aside(self, view: View) -> Vec3:
         energy = self.law_here(view).energy(self.touch(view)[1])
@@ -278,16 +273,21 @@ def beside_ends(
     nowhere more than that of the deeper, of laws that are linear or stiffen.
     """
     graph, (marker, half), (other, centre, halves) = view.graph, rod, solid
-    along, ends = along_axis(view, marker, 0), list[Expr]()
-    reach = vec.sub(view.position(marker), view.position(other))
-    for end in (-half, half):
-        place = vec.add(centre, vec.transpose_times(view.rotation(other), vec.add(reach, vec.scale(end, along))))
-        out = [graph.apply("max", x, -x) - h for x, h in zip(place, halves, strict=True)]
-        square = reduce(add, (graph.apply("max", 0.0, x) * graph.apply("max", 0.0, x) for x in out))
-        apart, inside = graph.apply("lt", 0.0, square), reduce(lambda a, b: graph.apply("max", a, b), out)
-        ends.append(radius - where(apart, sqrt(where(apart, square, 1.0)), inside))
+    larger = partial(graph.apply, "max")
+    reach, R = vec.sub(view.position(marker), view.position(other)), view.rotation(other)
+    middle = vec.add(centre, vec.transpose_times(R, reach))
+    along = vec.transpose_times(R, along_axis(view, marker, 0))
+
+    def gap(end: Expr) -> Expr:
+        place = vec.add(middle, vec.scale(end, along))
+        out = [larger(x, -x) - h for x, h in zip(place, halves, strict=True)]
+        square = reduce(add, (larger(0.0, x) * larger(0.0, x) for x in out))
+        apart = graph.apply("lt", 0.0, square)
+        return where(apart, sqrt(where(apart, square, 1.0)), reduce(larger, out))
+
+    deeper = where(graph.apply("lt", gap(half), gap(-half)), half, -half)  # so that one end has derivatives
     deep = graph.apply("lt", 0.0, depth)
-    part = graph.apply("min", 1.0, graph.apply("max", 0.0, graph.apply("max", *ends)) / where(deep, depth, 1.0))
+    part = graph.apply("min", 1.0, larger(0.0, radius - gap(deeper)) / where(deep, depth, 1.0))
     return where(deep, 1.0 - part * part, 1.0)
 
 

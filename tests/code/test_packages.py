@@ -359,3 +359,23 @@ def test_a_wheel_is_not_written_through_a_link(tmp_path: Path, monkeypatch: pyte
     assert found.code in (1, 2)
     assert "symbolic link" in found.err
     assert (tmp_path / "elsewhere").read_text() == "kept"
+
+
+def test_laws_of_pairs_are_short(tmp_path: Path) -> None:
+    """Those of edges and corners end where nothing touches, before shares of energy; ellipsoids take few statements."""
+    m = eg.Model("laws")
+    body = m.body("body", mass=1, inertia=(1, 1, 1))
+    m.free("joint", m.ground, body)
+    egg, rod = {"shape": "ellipsoid", "semi_axes": (0.1, 0.2, 0.3)}, {"shape": "capsule", "length": 1, "radius": 0.1}
+    m.contacts("eggs", {**egg, "on": body}, {**egg, "on": m.ground}, {"stiffness": 1e5})
+    m.contacts("edges", {"shape": "cuboid", "size": (1, 2, 3), "on": body}, {**rod, "on": m.ground}, {"stiffness": 1e5})
+    folder = package(m, tmp_path, target="c")
+    laws = dict(
+        law.split("(", 1) for path in folder.glob("*pairs*.c") for law in path.read_text().split("\nstatic flag ")[1:]
+    )
+    assert (
+        sum(law.count("\n    const real ") for name, law in laws.items() if re.search("ellipsoid_[0-9_]+$", name))
+        < 1750
+    )
+    shared = [law for name, law in laws.items() if re.search("edge_axis_|rod_rounded_corner_", name)]
+    assert sum(0 < law.find("EOMGEN_REJECT(0.0 >= ") < 0.15 * len(law) for law in shared) >= 2
