@@ -31,7 +31,7 @@ from ..mechanics.mobility import Mobility
 from ..mechanics.motion import entries_of, force_and_moment, with_entries
 from ..mechanics.sparse_rows import SparseRows
 from ..mechanics.switched import SwitchedRow, switched_rows
-from ..mechanics.wrenches import JointWrenches, Row6, joint_reactions
+from ..mechanics.wrenches import JointWrenches, Row6, joint_reactions, mass_parents
 from ..model.mechanism import Mechanism
 from ..native.limits import SYSTEMS_UNTOUCHED
 from .laws import MANY, laws_in, pieces_of, solve_laws
@@ -413,7 +413,7 @@ def _motion(
     bias = substitute(list(tree.bias), dict.fromkeys(forces, graph.zero))
     C = [constraints.jacobian[i] for i in mobility.independent_rows]
     gamma = [constraints.gamma[i] for i in mobility.independent_rows]
-    mass_matrix, parent = tree.mass_matrix, kinematics.parent
+    mass_matrix, parent = tree.mass_matrix, mass_parents(kinematics)
     still = without_inertia(kinematics, mobility, mass_matrix)
     if still and C:
         # massless bodies that loops move: (M + s C^T C) a + C^T l = -h - s C^T gamma has the same solution

@@ -23,7 +23,7 @@ from ..mechanics.methods.embedding import can_differentiate
 from ..mechanics.methods.recursions import ConstraintRow, TreeMotion
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
-from ..mechanics.wrenches import cut_drives, find_wrenches, motion_axes, near_pairs
+from ..mechanics.wrenches import find_wrenches, mass_parents, motion_axes, near_pairs
 from .linear_algebra import has_long_paths
 from .reactions import multiplier_values
 
@@ -84,9 +84,7 @@ class SystemTerms:
         self.n_dof = mobility.n_dof  #: degrees of freedom; n - n_dof is the rank of C_q
         #: n_dof indices into v: independent velocities, in the order of v_i
         self.preferred: tuple[int, ...] = independent_places(k, mobility)
-        #: per velocity the next one towards ground (-1: none), always a smaller index; a drive on a cut joint ties
-        #: branches, so that all are one chain
-        self.parent: tuple[int, ...] = tuple(range(-1, len(k.v) - 1)) if cut_drives(k) else k.parent
+        self.parent: tuple[int, ...] = mass_parents(k)
         self.centroidal = _centroidal(k)  #: (18 + 3n,) or none without mass
         self.quaternion_slots = k.quaternion_slots  #: where Euler parameters start in q, their angular velocity in v
         #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with each other

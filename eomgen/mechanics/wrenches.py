@@ -129,6 +129,14 @@ def cut_drives(kinematics: Kinematics) -> list[Drive]:
     return [drive for drive in find_drives(kinematics) if drive.velocity < 0]
 
 
+def mass_parents(kinematics: Kinematics) -> tuple[int, ...]:
+    """Per velocity the next one towards ground (-1: none) by which M is sparse, always a smaller index.
+
+    A drive on a cut joint ties branches, so that all are one chain.
+    """
+    return tuple(range(-1, len(kinematics.v) - 1)) if cut_drives(kinematics) else kinematics.parent
+
+
 Row6 = tuple[Expr, ...]  # force, moment
 
 

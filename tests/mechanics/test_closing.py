@@ -46,6 +46,28 @@ def test_two_carts_latch(method: str, target: str) -> None:
     assert force == pytest.approx(2.0 * speed * w * np.sin(w * (run.t[late] - hit)), abs=1e-5)
 
 
+def test_a_closed_constraint_beside_a_drive_on_a_cut_joint_is_that_which_never_opens() -> None:
+    """The armature of the joint that the loop is cut at couples the branches that meet there."""
+
+    def build(**switch: Any) -> Any:
+        m = eg.Model("five_bar", gravity=(0, -G, 0))
+        a, b, c, d = (m.body(n, mass=1.0 + i, com=(0.2, 0, 0), inertia={"zz": 0.02}) for i, n in enumerate("abcd"))
+        m.revolute("A", m.ground, a, coordinate="qA")
+        m.revolute("B", a.at(0.4, 0, 0), b, coordinate="qB")
+        m.revolute("C", b.at(0.5, 0, 0), c.at(0.5, 0, 0), armature=0.3)
+        m.revolute("D", d.at(0.4, 0, 0), c, coordinate="qD")
+        m.revolute("E", m.ground.at(0.6, 0, 0), d, coordinate="qE")
+        m.coupling("tie", equation="qA_dot + 0.5*qE_dot", **switch)
+        m.initial(qA=2.0, qE=1.1)
+        m.guess(qB=-1.2, qD=1.2)
+        return m.compile(target="numpy")
+
+    lasting, switched = build(), build(closes="1 - t", opens="2 - t", closed=True)
+    assert switched.loop_names == ("C",)
+    expected = lasting.rhs(0.0, lasting.x0())
+    np.testing.assert_allclose(switched.rhs(0.0, switched.x0())[:-1], expected, atol=1e-10)
+
+
 def test_latch_on_a_closed_loop_against_the_impact_of_numpy() -> None:
     """v+ = v - M^-1 J^T (J M^-1 J^T)^-1 J v with J of the loop and of the latch."""
     m = eg.Model("bars", gravity=(0, -G, 0))
