@@ -370,6 +370,7 @@ MATRIX = algebra.solve(NODES[None, :] ** (POWERS[:, None] - 1), (NODES[None, :] 
 #: Of the tolerances of the run whose steps are taken: a law that bends within a step, such as smoothed friction, weighs
 #: more in the derivatives than in the run.
 TIGHTER = 0.1
+HALVINGS = 3  #: of steps in which the formula misses the run, as fast changes under values far from those of a fit do
 FEW = 16  #: states up to which this is the faster way: the systems of a step grow with their third power
 ENTRIES = 2_000_000  #: of the systems that are held at once
 
@@ -387,26 +388,41 @@ def serves(module: BoundModel, forcing: Forcing) -> bool:
 
 def find_along(run: Variational, simulated: Callable[..., Trajectory], corners: Sequence[float], S: Array,
                times: Array, settings: Mapping[str, Any]) -> Array | None:  # fmt: skip
-    """S (n_t, n_x, k) at times of a run, from S at its start, where Gauss's formula meets the run; else None."""
+    """S (n_t, n_x, k) at times of a run, from S at its start, where Gauss's formula meets the run; else None.
+
+    Steps are those of the run, or halves of them where the formula misses the run.
+    """
     tight = {**settings, **{name: TIGHTER * settings[name] for name in ("rtol", "atol")}}
     grid = np.unique(np.concatenate([simulated(**tight).t, times, corners]))
+    for _ in range(HALVINGS + 1):
+        result, missed = along_steps(run, partial(simulated, **tight), grid, S, times, settings)
+        if not missed.any():
+            return result
+        grid = np.sort(np.concatenate([grid, (grid[:-1] + 0.5 * np.diff(grid))[missed]]))
+    return None
+
+
+def along_steps(run: Variational, simulated: Callable[..., Trajectory], grid: Array, S: Array, times: Array,
+                settings: Mapping[str, Any]) -> tuple[Array | None, Array]:  # fmt: skip
+    """S at times (None where a step misses), and which of the first steps that were looked at miss the run."""
     h, n_x, s = np.diff(grid), len(S), len(NODES)
     t = (grid[:-1, None] + h[:, None] * NODES).ravel()
-    whole = simulated(**tight, t_eval=np.unique(np.concatenate([t, grid])))
+    whole = simulated(t_eval=np.unique(np.concatenate([t, grid])))
     x, ends = whole.x[:, np.searchsorted(whole.t, t)], whole.x[:, np.searchsorted(whole.t, grid)]
     sizes, at = np.abs(whole.x).max(axis=1), np.searchsorted(grid, times)
     allowed = np.minimum(settings["atol"] + np.minimum(settings["rtol"], QUADRATURE) * sizes, QUADRATURE * sizes.max())
-    result, count = list[Array](), max(1, ENTRIES // (s * n_x) ** 2)
+    result, count, bad = list[Array](), max(1, ENTRIES // (s * n_x) ** 2), np.zeros(len(h), dtype=bool)
     for first in range(0, len(h), count):
         steps, nodes = h[first : first + count], slice(s * first, s * (first + count))
         _, rate, J, by, _ = run.rates(t[nodes], x[:, nodes], None)
         missed = steps * (rate.reshape(n_x, -1, s) @ WEIGHTS) - np.diff(ends[:, first : first + count + 1])
-        if not (np.abs(missed).max(axis=1) <= allowed).all():
-            return None
+        bad[first : first + count] = ~(np.abs(missed) <= allowed[:, None]).all(axis=0)
+        if bad.any():
+            return None, bad
         S_here = integrate_linear(steps, J, by, S)
         result += [S_here[k - first] for k in at[(first <= at) & (at < first + len(steps))]]
         S = S_here[-1]
-    return np.array([*result, *[S] * (len(times) - len(result))])
+    return np.array([*result, *[S] * (len(times) - len(result))]), bad
 
 
 def integrate_linear(h: Array, J: Array, by: Array, start: Array) -> Array:
