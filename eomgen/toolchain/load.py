@@ -163,17 +163,17 @@ NUMPY = "_core.py"  #: the file of the ``numpy`` target
 CODES = {**{error: status for status, error in STATUS.items()}, EvaluationError: 1}
 
 
-def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] | None = None) -> Any:
+def load_numpy(sources: Mapping[str, str], name: str, fallbacks: Mapping[str, Any] | None = None) -> Any:
     """Open the NumPy functions of a model, kept in the cache like a library: a ``Model`` of ``eomgen._native``.
 
-    The sources come from :func:`eomgen.codegen.targets.numpy.emit_numpy`; ``twins`` are what the text calls and does
-    not define, the Python fallbacks of native functions.  No compiler is needed.
+    The sources come from :func:`eomgen.codegen.targets.numpy.emit_numpy`; ``fallbacks`` are those of native functions,
+    which the text calls and does not define.  No compiler is needed.
     """
     text = sources[NUMPY]
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if not twins and (result := find_module(module_name)) is not None:
+    if not fallbacks and (result := find_module(module_name)) is not None:
         return result
 
     def written(directory: Path) -> tuple[str, Mapping[str, Any]]:
@@ -184,7 +184,7 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
         path = str(Cache(cache_directory()).make(key, "numpy", name, written).product)
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         path = f"<{module_name}>"
-    return load_source(module_name, path, text.encode(), twins).model
+    return load_source(module_name, path, text.encode(), fallbacks).model
 
 
 def open_functions(

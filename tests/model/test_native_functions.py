@@ -1,4 +1,4 @@
-"""Native functions: C sources of the user in the compiled module, their twins, and the packages."""
+"""Native functions: C sources of the user in the compiled module, their Python fallbacks, and the packages."""
 
 from __future__ import annotations
 

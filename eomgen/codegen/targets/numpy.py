@@ -23,7 +23,7 @@ DIRECTIONS = ("dq", "dv", "da", "du", "dp", "directions")
 
 
 def define_functions(program: Program) -> tuple[list[str], list[str]]:
-    """Imports and definitions of ``call_<function>`` for the NumPy module; the loader puts :func:`twins` into it.
+    """Imports and definitions of ``call_<function>`` for the NumPy module; the loader puts :func:`fallbacks` into it.
 
     Raises UsageError (a native function has no Python fallback).
     """
@@ -42,7 +42,7 @@ def define_functions(program: Program) -> tuple[list[str], list[str]]:
     return imports, definitions
 
 
-def twins(program: Program) -> dict[str, PythonFallback]:
+def fallbacks(program: Program) -> dict[str, PythonFallback]:
     """Python fallbacks of the native functions a program calls, by the names that the NumPy module uses."""
     result = {}
     for f, _ in used_calls(program).values():
@@ -107,4 +107,4 @@ def load(
     with without_gc(), timed(seconds, "emit"):
         sources = emit_numpy(program)
     with timed(seconds, "load"):
-        return load_numpy(sources, program.name, twins(program))
+        return load_numpy(sources, program.name, fallbacks(program))
