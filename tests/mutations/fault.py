@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ def read_sources(root: Path) -> dict[Path, str]:
     return {p: p.read_text(encoding="utf-8") for p in files if p.is_file() and p.suffix not in (".pyc", ".so")}
 
 
+@dataclass(frozen=True)
 class Fault:
     """A change of the sources that makes results wrong, wherever they lie and however they are laid out.
 
@@ -26,8 +29,12 @@ class Fault:
     fail then.  ``breaks`` says what is wrong.
     """
 
-    def __init__(self, id: str, where: str, old: str, new: str, breaks: str, *caught_by: str) -> None:
-        self.id, self.where, self.old, self.new, self.breaks, self.caught_by = id, where, old, new, breaks, caught_by
+    id: str
+    where: str
+    old: str
+    new: str
+    breaks: str
+    caught_by: Sequence[str] = ()
 
     def apply(self, texts: Mapping[Path, str]) -> tuple[Path, str]:
         """The file in which the fault lies, and its text with the fault.
@@ -85,3 +92,8 @@ def _name(node: Any) -> str | None:
     """The name that a statement gives to something."""
     target = node.targets[0] if isinstance(node, ast.Assign) else getattr(node, "target", node)
     return getattr(target, "name", getattr(target, "id", None))
+
+
+FAULTS = tuple(
+    Fault(id, **entry) for id, entry in tomllib.loads(Path(__file__).with_name("faults.toml").read_text()).items()
+)

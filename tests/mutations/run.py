@@ -19,8 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from mutations.copies import Copy, Outcome
-from mutations.fault import Fault
-from mutations.faults import FAULTS
+from mutations.fault import FAULTS, Fault
 
 RESULTS = Path(__file__).with_name("RESULTS.md")
 FAILED = 1  #: pytest's status of a run in which tests failed

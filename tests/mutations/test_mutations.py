@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 from mutations.copies import Copy
-from mutations.fault import ROOT, Fault, read_sources
-from mutations.faults import FAULTS
+from mutations.fault import FAULTS, ROOT, Fault, read_sources
 from mutations.run import FAILED, RESULTS
 
 TRIED = ("quotient-rule", "wide-steps", "gear-inverted")
