@@ -93,13 +93,13 @@ def lane_files(program: Program, context: Mapping[str, Any], printed: Mapping[st
     ensembles = bool(first) and not context["library"]
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
     for width, (tests, feature) in WIDTHS.items():
-        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": ensembles}
-        shown["series"] = ensembles and program.metadata["series"]
-        files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
+        values = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": ensembles}
+        values["series"] = ensembles and program.metadata["series"]
+        files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", values)
         if ensembles:
-            fused = {**shown, "tests": (*tests, "fma") if tests else (), "call": call}
+            fused = {**values, "tests": (*tests, "fma") if tests else (), "call": call}
             files[f"{name}_contracted_lanes{width}.c"] = render("c/contracted.c.j2", {**fused, "series": False})
-            if shown["series"]:
+            if values["series"]:
                 files[f"{name}_series_lanes{width}.c"] = render("c/contracted.c.j2", fused)
     return files
 

@@ -107,8 +107,8 @@ def _tables(function: PairFunction) -> list[dict[str, Any]]:
     for k, rows in enumerate(function.tables):
         table = written([(row[0], *(x - begun if x >= 0 else x for x in row[1:])) for row in rows])
         sizes, length = len(rows[0]) - PLACE - REST, placed_length(rows)
-        own = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length, "lined": False}
-        result.append({**table, **own, "start": start, "number": number})
+        counts = {"k": k, "count": len(rows), "columns": len(rows[0]), "sizes": sizes, "length": length, "lined": False}
+        result.append({**table, **counts, "start": start, "number": number})
         number += len(rows)
         start += len(rows) * length
     return result
@@ -257,13 +257,13 @@ def _law(
         rate = k >= count
         plain = symbol.removeprefix("d_")
         letter, number = plain[0], int(plain[1:])
-        own = len(kind.law) + kind.states  # states stand behind the numbers of the law
+        law_length = len(kind.law) + kind.states  # states stand behind the numbers of the law
         shape = tables[kind.first if letter == "a" else kind.second]["length"]
         if len(kind.corners) == 2:
             shape = POSE + (OWN if letter == "a" else OTHER)
         elif kind.corners and letter == "a":
             shape = POSE + CHOSEN
-        step = own if letter in "ls" else shape
+        step = law_length if letter in "ls" else shape
         number += len(kind.law) * (letter == "s")
         places[graph.symbol(symbol).id] = f"{'xucc'['abls'.index(letter)]}[{number + rate * step}]"
     inner = replace(program, graph=graph)

@@ -309,10 +309,10 @@ class BranchPrinter(BlockPrinter):
         if operand in self._both:
             return self._both[operand]
         if x in self._second:
-            own = self._own(x)
-            if own not in self._both:
-                self._new(own, f"both_at(w + {piece.loads[x]})", result)
-            return self._both[own] if own == operand else self._new(operand, f"both_turned({self._both[own]})", result)
+            at = self._own(x)
+            if at not in self._both:
+                self._new(at, f"both_at(w + {piece.loads[x]})", result)
+            return self._both[at] if at == operand else self._new(operand, f"both_turned({self._both[at]})", result)
         for k in (x, y):
             self._read(k, piece, loaded, result)
         minus = "-" if sign < 0 else ""

@@ -95,8 +95,8 @@ def _dependences(
 ) -> dict[int, frozenset[int]] | None:
     """The states of pairs that nodes depend on but for what pairs exert on bodies; None where that is not known."""
     slots = {one.function.name: one.slots for one in sums}
-    held = {k for one in sums for k in one.slots}
-    result: dict[int, frozenset[int]] = {i: frozenset([k]) for i, k in index.items() if k in held}
+    states = {k for one in sums for k in one.slots}
+    result: dict[int, frozenset[int]] = {i: frozenset([k]) for i, k in index.items() if k in states}
     for i in order:
         operation, *operands = graph.nodes[i]
         call = pair_call(graph, operation)
@@ -126,13 +126,13 @@ def _groups(rows: dict[int, list[int]]) -> tuple[tuple[int, ...], ...]:
     """Columns that share no row, each in the first group that it fits in."""
     groups: list[list[int]] = []
     taken: list[set[int]] = []
-    for column, own in rows.items():
-        at = next((k for k, used in enumerate(taken) if used.isdisjoint(own)), len(groups))
+    for column, entries in rows.items():
+        at = next((k for k, used in enumerate(taken) if used.isdisjoint(entries)), len(groups))
         if at == len(groups):
             groups.append([])
             taken.append(set())
         groups[at].append(column)
-        taken[at].update(own)
+        taken[at].update(entries)
     return tuple(map(tuple, groups))
 
 

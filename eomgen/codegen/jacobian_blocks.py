@@ -78,11 +78,11 @@ class ResidualSlopes:
             forces = [x + y for x, y in zip(terms.inverse_dynamics, terms.constraint_forces, strict=True)]
             return jacobian([*forces, *rest], wrt)
         entries = jacobian([*terms.constraint_forces, *rest], wrt)
-        own = self.by_recursion
+        chosen = self.by_recursion
         if self.is_short(terms.inverse_dynamics):
             other = self.by_formula()
-            own = own if self.operations < count(list(other.values())).total else other
-        for key, value in own.items():
+            chosen = chosen if self.operations < count(list(other.values())).total else other
+        for key, value in chosen.items():
             entries[key] = entries[key] + value if key in entries else value
         return entries
 

@@ -66,10 +66,10 @@ def quadratic_form(columns: Sequence[Row], N: Sequence[Row], legs: Sequence[Leg]
     legs = [leg for leg in legs if all(N[k].keys() <= leg[0] for k in leg[0])]
     apart = set().union(*(leg[0] for leg in legs))
     rest = [{k: x for k, x in column.items() if k not in apart} for column in columns]
-    across = [{k: x for k, row in enumerate(N) if (x := dot(row, column)) is not None} for column in rest]
+    products = [{k: x for k, row in enumerate(N) if (x := dot(row, column)) is not None} for column in rest]
     result: list[Row] = [{} for _ in columns]
     for i, column in enumerate(rest):
-        for k, other in enumerate(across[: i + 1]):
+        for k, other in enumerate(products[: i + 1]):
             if (entry := dot(column, other)) is not None:
                 result[i][k] = result[k][i] = entry
     for _, K, C in legs:
@@ -194,18 +194,18 @@ def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
 
     Of these, those that leave the fewest rows: a row of loops is taken from its ends, one loop after the other.
     """
-    held = dict(enumerate(map(set, pattern)))
+    rows_left = dict(enumerate(map(set, pattern)))
     touching: list[set[int]] = [set() for _ in range(n)]
-    for i, row in held.items():
+    for i, row in rows_left.items():
         for k in row:
             touching[k].add(i)
-    result, waiting, new = [], set(range(n)), len(held)
+    result, waiting, new = [], set(range(n)), len(rows_left)
 
     known: dict[int, tuple[set[int], set[int]]] = {}  #: column -> columns of the same rows, and the others of these
 
     def taken(k: int) -> tuple[set[int], set[int]]:
         if k not in known:
-            near = set().union(*(held[i] for i in touching[k]))
+            near = set().union(*(rows_left[i] for i in touching[k]))
             columns = {j for j in near if touching[j] <= touching[k]}
             known[k] = columns, near - columns
         return known[k]
@@ -221,11 +221,11 @@ def fronts(pattern: Sequence[Iterable[int]], n: int) -> list[Front] | None:
         result.append(Front(tuple(sorted(rows)), tuple(sorted(columns)), tuple(sorted(others)), left))
         for k in others:
             touching[k] = (touching[k] - rows) | set(left)
-        for j in others.union(*(held[i] for k in others for i in touching[k] if i in held)):
+        for j in others.union(*(rows_left[i] for k in others for i in touching[k] if i in rows_left)):
             known.pop(j, None)
         for i in rows:
-            del held[i]
-        held |= {i: set(others) for i in left}
+            del rows_left[i]
+        rows_left |= {i: set(others) for i in left}
         waiting -= columns
     return result
 
@@ -259,21 +259,21 @@ class OrthogonalFactor:
         self.n, self.m = n, len(rows)
         self.apart: list[Apart] = []  #: what every column has across those before it
         self._taken: list[_Taken] = []
-        held = dict(enumerate(rows))
+        rows_left = dict(enumerate(rows))
         #: squares of the lengths of the columns (n,)
         self.squares = [x for column in transpose(rows, n) if (x := dot(column, column)) is not None]
         self.parts = connected(rows)  #: columns that rows connect
         #: most columns of which one is compared with combinations of rows that the others have left
         self.longest = _longest(order)
         for front in order:
-            own = [held.pop(i) for i in front.rows]
-            graph = next(x.graph for row in own for x in row.values())
-            block = [[row.get(k, graph.zero) for k in front.columns] for row in own]
+            taken = [rows_left.pop(i) for i in front.rows]
+            graph = next(x.graph for row in taken for x in row.values())
+            block = [[row.get(k, graph.zero) for k in front.columns] for row in taken]
             inverse, free, apart = _split(block)
-            beside = [{k: row[k] for k in front.others if k in row} for row in own]
+            beside = [{k: row[k] for k in front.others if k in row} for row in taken]
             across = [_combined(part, beside) for part in inverse]
             for i, part in zip(front.left, free, strict=True):
-                held[i] = _combined(part, beside)
+                rows_left[i] = _combined(part, beside)
             self._taken.append(_Taken(front, inverse, free, across))
             self.apart += [Apart(tuple(front.columns[k] for k in x.columns), x.before, x.square) for x in apart]
 
@@ -283,9 +283,9 @@ class OrthogonalFactor:
         b = dict(enumerate(right))
         values: list[list[Expr]] = []
         for front, inverse, free, _ in self._taken:
-            own = {j: b[i] for j, i in enumerate(front.rows) if not b[i].is_zero}
-            values.append([_product(part, own, zero) for part in inverse])
-            b.update(zip(front.left, (_product(part, own, zero) for part in free), strict=True))
+            known = {j: b[i] for j, i in enumerate(front.rows) if not b[i].is_zero}
+            values.append([_product(part, known, zero) for part in inverse])
+            b.update(zip(front.left, (_product(part, known, zero) for part in free), strict=True))
         x = [zero] * self.n
         for (front, _, _, across), value in zip(reversed(self._taken), reversed(values), strict=True):
             for k, total, row in zip(front.columns, value, across, strict=True):
@@ -380,8 +380,8 @@ def _square(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], list
     determinant = vec.dot(a, first)
     inverse = 1.0 / determinant
     rows = [_row(*vec.scale(inverse, x)) for x in (first, second, third)]
-    across = vec.dot(third, third)
-    return rows, [], [Apart((0, 1), one, across), Apart((2,), across, determinant * determinant)]
+    square = vec.dot(third, third)
+    return rows, [], [Apart((0, 1), one, square), Apart((2,), square, determinant * determinant)]
 
 
 def _reflected(block: Sequence[Sequence[Expr]]) -> tuple[list[Row], list[Row], list[Apart]]:

@@ -61,8 +61,8 @@ class MotionLoops(LoopBlocks):
         """About how many multiplications the linear algebra takes, by the pattern alone."""
         total = work(self.order or (), 1) + self.terms.n_dof**3 // 6
         for part in connected(self._left):
-            own = [row for row, left in zip(self.rows, self._left, strict=True) if not part.isdisjoint(left)]
-            freedoms = len(set().union(*own)) - len(part)
+            rows = [row for row, left in zip(self.rows, self._left, strict=True) if not part.isdisjoint(left)]
+            freedoms = len(set().union(*rows)) - len(part)
             total += len(part) * freedoms * (freedoms + 2)
         return total
 
@@ -103,11 +103,11 @@ class MotionLoops(LoopBlocks):
         """The parts that fewer rows hold than freedoms drive."""
         zero, one, result = self.terms.graph.zero, self.terms.graph.one, list[Leg]()
         for part in self._factor.parts:
-            held = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
-            rows = [self.rows[i] for i in held]
+            places = [i for i, row in enumerate(self._left) if not part.isdisjoint(row)]
+            rows = [self.rows[i] for i in places]
             C = [{r: -row[k] for r, row in enumerate(rows) if k in row} for k in self.terms.preferred]
-            if len(held) < sum(map(bool, C)):
-                units = [[one if j == i else zero for j in range(len(self._left))] for i in held]
+            if len(places) < sum(map(bool, C)):
+                units = [[one if j == i else zero for j in range(len(self._left))] for i in places]
                 K = rows_of([self._particular(unit)[0] for unit in units])
                 result.append(({self.dependent[k] for k in part}, K, C))
         return result

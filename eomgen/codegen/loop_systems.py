@@ -73,12 +73,12 @@ def summands(x: Expr) -> list[Expr]:
 def estimate(jacobian: Sequence[Sequence[Expr]], n_dof: int) -> int:
     """About how many multiplications the linear algebra of the embedded system takes, by the pattern of C_q (m, n)."""
     touching: dict[int, set[int]] = {}
-    held = rows_of(jacobian)
-    for i, row in enumerate(held):
+    rows = rows_of(jacobian)
+    for i, row in enumerate(rows):
         for k in row:
             touching.setdefault(k, set()).add(i)
     n = len(jacobian[0]) if jacobian else 0
-    pattern = [dict.fromkeys(sorted({j for k in row for j in touching[k]})) for row in held]
+    pattern = [dict.fromkeys(sorted({j for k in row for j in touching[k]})) for row in rows]
     return 2 * minimum_degree(pattern)[1] + n * n_dof * n_dof + n_dof**3 // 6
 
 
@@ -277,14 +277,14 @@ class LoopBlocks(ABC):
             members.setdefault(group, []).append(square)
         unit = graph.constant(1.0) / (self.unit * self.unit)
         result = {}
-        for group, own in members.items():
+        for group, pivots in members.items():
             if group == ALL:
                 size = largest(self.row_squares)
             else:
                 size = (
                     unit
                     if group == UNIT
-                    else graph.apply("max", largest(own), unit * (CROSSINGS_SMALL * CROSSINGS_SMALL))
+                    else graph.apply("max", largest(pivots), unit * (CROSSINGS_SMALL * CROSSINGS_SMALL))
                 )
             result[group] = size * CROSSINGS_NEAR_SQUARE
         return result
@@ -354,8 +354,8 @@ class EmbeddedLoops(LoopBlocks):
     @property
     def determined(self) -> bool:
         """Whether some row holds each dependent coordinate; else the preferred partition is never sound."""
-        held = {k for row in self.J for k in row}
-        return held.issuperset(k for k in range(self.terms.n_v) if k not in self.terms.preferred)
+        columns = {k for row in self.J for k in row}
+        return columns.issuperset(k for k in range(self.terms.n_v) if k not in self.terms.preferred)
 
     def _accelerate(self, moved: dict[Expr, Expr], conditions: list[Expr]) -> tuple[list[Expr], list[Expr]]:
         terms, graph = self.terms, self.terms.graph
@@ -434,9 +434,9 @@ class EmbeddedLoops(LoopBlocks):
                 continue
             (i, j), (k, l) = block.rows, block.columns
             p, q, r, t = (rows[m].get(c, graph.zero) for m in (i, j) for c in (k, l))
-            sizes, across, determinant = apart(p, q, r, t)
-            conditions.append(graph.apply("lt", sizes * self.lost, across))
-            self._angles[sizes, across] = None
+            sizes, cross, determinant = apart(p, q, r, t)
+            conditions.append(graph.apply("lt", sizes * self.lost, cross))
+            self._angles[sizes, cross] = None
             inverse = 1.0 / determinant
             x[k] = (t * b[0] - q * b[1]) * inverse
             x[l] = (p * b[1] - r * b[0]) * inverse

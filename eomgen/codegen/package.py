@@ -120,8 +120,8 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
     """What is generated in Python besides the core, and what is carried of eomgen."""
     included = include(CONTENTS, context["metadata"], context["analyses"])
     names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md", "tests/test_recorded.py")
-    own = context | {"folders": folders_of(included), "compiled": True}
-    return {"py.typed": "", **{name: render(f"python/{name}.j2", own) for name in names}, **included}
+    context = context | {"folders": folders_of(included), "compiled": True}
+    return {"py.typed": "", **{name: render(f"python/{name}.j2", context) for name in names}, **included}
 
 
 def include(names: Iterable[str], metadata: Mapping[str, Any], analyses: bool = False) -> dict[str, str]:

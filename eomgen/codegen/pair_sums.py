@@ -270,11 +270,11 @@ def contact_areas(program: Program) -> list[tuple[str, int]]:
 
 def contact_tables(program: Program) -> dict[str, Any] | None:
     """What ``equations.c.j2`` writes of them."""
-    held = program.contacts
-    if held is None:
+    contacts = program.contacts
+    if contacts is None:
         return None
     sums, at, load = [], 0, 0
-    for one in held.sums:
+    for one in contacts.sums:
         function = one.function
         sums.append(
             {
@@ -290,13 +290,13 @@ def contact_tables(program: Program) -> dict[str, Any] | None:
         )
         at += len(one.places)
         load += WRENCH * function.bodies
-    states = [k for group in held.groups for k in group]
+    states = [k for group in contacts.groups for k in group]
     return {
         "sums": sums,
-        "groups": held.groups,
-        "starts": list(accumulate(map(len, held.groups), initial=0)),
+        "groups": contacts.groups,
+        "starts": list(accumulate(map(len, contacts.groups), initial=0)),
         "states": states,
-        "firsts": list(accumulate((len(held.rows[k]) for k in states), initial=0)),
-        "rows": [row for k in states for row in held.rows[k]],
-        "loads": len(held.loads),
+        "firsts": list(accumulate((len(contacts.rows[k]) for k in states), initial=0)),
+        "rows": [row for k in states for row in contacts.rows[k]],
+        "loads": len(contacts.loads),
     }

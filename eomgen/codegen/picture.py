@@ -222,8 +222,8 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
     if curve is None:
         return None
     ends = {"low": seen.low, "high": seen.high}
-    held = {} if seen.follower is None else {"stops": [_stop(n, seen.follower)], "face": seen.face}
-    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, **ends, **held}
+    following = {} if seen.follower is None else {"stops": [_stop(n, seen.follower)], "face": seen.face}
+    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, **ends, **following}
 
 
 def _owner(x: Expr | None, owners: Mapping[str, int]) -> int | None:

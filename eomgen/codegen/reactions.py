@@ -185,9 +185,9 @@ def refuse_joints(kinematics: Kinematics) -> None:
         columns = spec.joint.subspace(graph, [kinematics.motion.coordinates[n][0] for n in spec.coordinates])
         of = [velocity.of for velocity in spec.joint.velocities]
         place = spec.coordinates.index(force.path.name)
-        own = columns[of.index(place)] if place in of else ()
+        parts = columns[of.index(place)] if place in of else ()
         turns = spec.joint.coordinates[place].kind == "angle"
-        straight = [[not part[2].is_zero and part[0].is_zero and part[1].is_zero for part in own]]
+        straight = [[not part[2].is_zero and part[0].is_zero and part[1].is_zero for part in parts]]
         free = [any(not linear[k].is_zero for _, linear in columns) for k in range(3)]
         if straight != [[turns, not turns]] or free[0] or free[1]:
             message = f"joint {spec.name!r} is {spec.joint.type_name}, which has no force across one fixed axis"
@@ -311,18 +311,18 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     graph, mechanism, motion = kinematics.graph, kinematics.mechanism, kinematics.motion
     laws, speaking = dict[Expr, None](), dict[str, list[Expr]]()
     for terms in kinematics.forces:
-        own = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_reaction)]
-        if any(pieces_of(law, is_reaction) is None for law in own):
+        laws_here = [law for load in _loads(terms) for law in laws_in(entries_of(load), is_reaction)]
+        if any(pieces_of(law, is_reaction) is None for law in laws_here):
             raise ModelError([too_many_pieces(mechanism, terms.force.name)])
-        laws |= dict.fromkeys(own)
-        speaking |= {terms.force.name: own} if own else {}
+        laws |= dict.fromkeys(laws_here)
+        speaking |= {terms.force.name: laws_here} if laws_here else {}
     requested = [graph.symbol(name) for name in mechanism.reaction_quantities]
     seen = substitute(requested, motion.derived_symbols(mechanism, {*mechanism.reaction_quantities}))
     names = sorted(name for name in symbols_of([*laws, *seen]) if is_reaction(name))
     forces = [graph.symbol(f"law[{k}]") for k in range(len(laws))]
-    rows, held = switched_rows(kinematics)
+    rows, switched = switched_rows(kinematics)
     linear = _replaced(kinematics, dict(zip(laws, forces, strict=True)))
-    linear = replace(linear, forces=(*linear.forces, *held))
+    linear = replace(linear, forces=(*linear.forces, *switched))
     symbols = [graph.symbol(name) for name in names]
     values, known, after = list[Expr](), dict[Expr, Expr](), dict[str, tuple[tuple[str, Expr], ...]]()
     if not (names or laws or rows):  # what is asked for is 0 in every state: the moment about a hinge
@@ -346,7 +346,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
         values = _reactions(linear, mobility, names, (), speaking)[0]
     motion = copy(motion)
     motion.known_reactions = dict(zip(names, values, strict=False))
-    whole = replace(kinematics, forces=(*kinematics.forces, *held))
+    whole = replace(kinematics, forces=(*kinematics.forces, *switched))
     solved = _replaced(whole, known | dict(zip(symbols, values, strict=True)))
     solved = replace(solved, motion=motion, reaction_laws=tuple(speaking), velocities_after=after)
     known_rows = tuple((row.label, row.state, row.kind) for row in rows)
@@ -436,10 +436,10 @@ def _motion(
     result = []
     for k, a in enumerate(free):
         gap = [dot(row, a) + (g if k == 0 else 0.0) for row, g in zip(C, gamma, strict=True)]
-        held = eliminate(schur, gap)
-        for y, multiplier in zip(moved, held, strict=True):
+        multipliers = eliminate(schur, gap)
+        for y, multiplier in zip(moved, multipliers, strict=True):
             a = [x - multiplier * z for x, z in zip(a, y, strict=True)]
-        result.append([*a, *held])
+        result.append([*a, *multipliers])
     return result[0], result[1:]
 
 
@@ -447,7 +447,7 @@ def _reactions(
     kinematics: Kinematics,
     mobility: Mobility,
     names: Sequence[str],
-    held: Sequence[SwitchedRow],
+    switched: Sequence[SwitchedRow],
     laws: Laws,
 ) -> tuple[list[Expr], list[Expr]]:
     """The components in terms of accelerations, multipliers and forces, and the multipliers of ``labels``.
@@ -459,7 +459,7 @@ def _reactions(
     rows = {label: graph.symbol(f"multiplier[{label}]") for label in kinematics.constraints.labels}
     unloaded = {label: graph.symbol(f"multiplier[{label}]") for label in wrenches.on_bodies if label not in rows}
     every = joint_reactions(wrenches, rows | unloaded)
-    known = rows | unloaded | {row.label: row.multiplier for row in held}
+    known = rows | unloaded | {row.label: row.multiplier for row in switched}
     where = [reaction_of(name) for name in names]
     reactions = []
     for name, place in zip(names, where, strict=True):
@@ -479,13 +479,13 @@ def _reactions(
 
 def _row(kinematics: Kinematics, name: str, labels: Sequence[str], laws: Laws) -> str:
     """The label of an equation, which may be named by its element where that has no other. Raises ModelError."""
-    own = [label for label in labels if label.partition(".")[0] == name.partition(".")[0]]
-    if name in own:
+    of_joint = [label for label in labels if label.partition(".")[0] == name.partition(".")[0]]
+    if name in of_joint:
         return name
-    if name == name.partition(".")[0] and len(own) == 1:
-        return own[0]
-    message = f"there is no equation {name!r}" if own else f"{name.partition('.')[0]!r} has no equation"
+    if name == name.partition(".")[0] and len(of_joint) == 1:
+        return of_joint[0]
+    message = f"there is no equation {name!r}" if of_joint else f"{name.partition('.')[0]!r} has no equation"
     quantities = kinematics.mechanism.reaction_quantities
     path = next(q.path for q in quantities.values() if not q.part and q.of == name)
-    remedy = f"there are: {', '.join(own or labels) or 'none'}; joints have equations where they close a loop"
+    remedy = f"there are: {', '.join(of_joint or labels) or 'none'}; joints have equations where they close a loop"
     raise ModelError([kinematics.mechanism.problem(path, message, remedy, "EG-NAME-UNKNOWN")])

@@ -43,13 +43,13 @@ class SegmentReader:
     ) -> None:
         self.nodes, self.known, self.results, self.checked = graph.nodes, known, results, checked
         self.single = single
-        self.found: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
+        self.signatures: dict[tuple[int, ...], tuple[Signature, tuple[int, ...]]] = {}
 
     def read(self, segment: Segment) -> tuple[Signature, tuple[int, ...]]:
         """The signature of a segment, and what it reads from outside in order of first use."""
-        if segment not in self.found:
-            self.found[segment] = self._read(segment)
-        return self.found[segment]
+        if segment not in self.signatures:
+            self.signatures[segment] = self._read(segment)
+        return self.signatures[segment]
 
     def letters(self, segment: Sequence[int]) -> list[Signature]:
         """What each statement of a segment is like: where it reads, and whether others need it, but not which."""

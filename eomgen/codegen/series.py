@@ -86,7 +86,7 @@ class _Terms:
         self._nodes = graph.nodes
         self._hoisted = program.parameter_only
         self._terms: list[Term] = []
-        self._found: dict[tuple[object, ...], int] = {}
+        self._index: dict[tuple[object, ...], int] = {}
         self._of: dict[int, int] = {graph.symbol(program.time).id: self._add(Term("time", varies=True))}
         for k, name in enumerate(block.inputs):
             self._of[graph.symbol(name).id] = self._add(Term("state", value=float(k), varies=True))
@@ -117,12 +117,12 @@ class _Terms:
 
     def _add(self, term: Term) -> int:
         key = (term.kind, term.operands, term.node, term.value)
-        if key not in self._found:
+        if key not in self._index:
             if len(self._terms) >= MOST_TERMS:
                 raise NoSeriesError(TOO_LONG)
-            self._found[key] = len(self._terms)
+            self._index[key] = len(self._terms)
             self._terms.append(term)
-        return self._found[key]
+        return self._index[key]
 
     def _number(self, value: float) -> int:
         return self._add(Term("number", value=value))

@@ -89,21 +89,21 @@ def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dic
             result += each * (1 + names.count(",")) + sum(_length(lengths, numbers) for lengths in arrays)
         return result + sum(len(_OPERATOR.findall(expression)) for expression in _EXPRESSION.findall(text))
 
-    own: dict[str, int] = {}
+    size: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
     for text in texts:
         for function, parameters, body in _FUNCTION.findall(text):
             count = parameters.count(",") + (6 if "EOMGEN_ARGUMENTS" in parameters else 1)
             function = function.removeprefix(f"{name}_") if function.endswith("_block") else function
-            own[function] = max(own.get(function, 0), _FRAME + _PLACE * (places(body) + count))
+            size[function] = max(size.get(function, 0), _FRAME + _PLACE * (places(body) + count))
             called = (*_CALL.findall(body), *(f"{block}_block" for block in _EVALUATION.findall(body)))
             calls.setdefault(function, set()).update(called)
 
     @cache
     def total(function: str) -> int:
-        return own[function] + max((total(callee) for callee in calls[function] & own.keys() - {function}), default=0)
+        return size[function] + max((total(each) for each in calls[function] & size.keys() - {function}), default=0)
 
-    return {function: total(function) for function in own}
+    return {function: total(function) for function in size}
 
 
 def _length(lengths: str, numbers: Mapping[str, str]) -> int:

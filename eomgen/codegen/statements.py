@@ -145,13 +145,13 @@ class _Finder:
             operands = node[1:]
             if not any(k in self.second for k in operands) or any(k in self.first for k in operands):
                 continue
-            own = self._key(node[0], map(self._stand_in, operands))
+            key = self._key(node[0], map(self._stand_in, operands))
             other = self._key(node[0], (self.second.get(k, self._stand_in(k)) for k in operands))
-            if own in seen:
+            if key in seen:
                 continue
-            seen.add(own)
+            seen.add(key)
             if other in like:
-                self._match(like[own], like[other])
+                self._match(like[key], like[other])
             else:
                 self._match_symbols(i)
 

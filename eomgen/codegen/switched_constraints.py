@@ -58,13 +58,13 @@ def solve_switched(matrix: Matrix, right: Sequence[Sequence[Expr]]) -> list[list
     """
     graph, n, A = matrix[0][0].graph, len(matrix), [list(row) for row in matrix]
     columns, pivots = [list(column) for column in right], list[Expr]()
-    own = []
+    independent = []
     for k in range(n):
         least = SINGULAR * graph.apply("abs", matrix[k][k])
-        own.append(graph.apply("lt", least, graph.apply("abs", A[k][k])))
-        pivots.append(where(own[k], A[k][k], 1.0))
+        independent.append(graph.apply("lt", least, graph.apply("abs", A[k][k])))
+        pivots.append(where(independent[k], A[k][k], 1.0))
         for i in range(k + 1, n):
-            ratio = where(own[k], A[i][k] / pivots[k], 0.0)
+            ratio = where(independent[k], A[i][k] / pivots[k], 0.0)
             for j in range(k + 1, n):
                 A[i][j] = A[i][j] - ratio * A[k][j]
             for column in columns:
@@ -72,7 +72,7 @@ def solve_switched(matrix: Matrix, right: Sequence[Sequence[Expr]]) -> list[list
     for x in columns:
         for k in reversed(range(n)):
             rest = total([x[k], *(-(A[k][j] * x[j]) for j in range(k + 1, n))])
-            x[k] = where(own[k], rest / pivots[k], 0.0)
+            x[k] = where(independent[k], rest / pivots[k], 0.0)
     return columns
 
 
@@ -115,17 +115,17 @@ class AfterEvents:
         k, reset = self.kinematics, dict(event.reset)
         new = {k.graph.symbol(name): value for name, value in reset.items()}
         v = given_v = substitute(list(k.v), new)
-        own = [self._closed(row, reset, new) for row in self.rows]
+        after = [self._closed(row, reset, new) for row in self.rows]
         lasting = list[RowAfter]()
         if not {*k.names, *k.velocity_names}.isdisjoint(reset):
-            lasting = self._lasting(own, new)
-            held = [one._replace(on=row.on) for one, row in zip(own, self.rows, strict=True)] if closes else own
-            acting = [*(lasting if len(lasting) <= MOST else ()), *held]
+            lasting = self._lasting(after, new)
+            closed = [one._replace(on=row.on) for one, row in zip(after, self.rows, strict=True)] if closes else after
+            acting = [*(lasting if len(lasting) <= MOST else ()), *closed]
             v = self._moved(v, v, acting, [self._shortest(one) for one in acting])
         if closes:  # an impact
-            v = self._moved(v, given_v, own, [substitute(column, new) for column in self.columns])
+            v = self._moved(v, given_v, after, [substitute(column, new) for column in self.columns])
         fits = k.graph.one
-        for one in (*lasting, *own):
+        for one in (*lasting, *after):
             fits = fits * self._fulfilled(one, given_v, v)
         no_number = k.graph.apply("log", fits)  # 0 where all are fulfilled
         return [x + no_number for x in v]
@@ -147,11 +147,11 @@ class AfterEvents:
         before = substitute([row.errors[0]], {s: x for s, x in new.items() if s.node[1] == row.state})[0]
         return RowAfter(on, J, rate, error, error - before, self._size(row.kind))
 
-    def _lasting(self, own: Sequence[RowAfter], new: Mapping[Expr, Expr]) -> list[RowAfter]:
+    def _lasting(self, after: Sequence[RowAfter], new: Mapping[Expr, Expr]) -> list[RowAfter]:
         """The equations of the mechanism that are connected with closed ones, beside which they have to hold."""
         c, result = self.kinematics.constraints, []
-        on = own[0].on
-        for one in own[1:]:
+        on = after[0].on
+        for one in after[1:]:
             on = where(one.on, 1.0, on)
         reached = {k for row in self.rows for k, x in enumerate(row.jacobian) if not x.is_zero}
         known = [{k for k, x in enumerate(row) if not x.is_zero} for row in c.jacobian]

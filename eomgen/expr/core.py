@@ -605,8 +605,8 @@ class _Copies:
             made = tuple.__new__(kind, self._each(x))
         elif _is_record(kind):
             made = self.memo[id(x)] = kind.__new__(kind)
-            held = vars(x)
-            vars(made).update(zip(held, self._each(held.values()), strict=True))
+            members = vars(x)
+            vars(made).update(zip(members, self._each(members.values()), strict=True))
         else:
             return deepcopy(x, self.memo)
         return self.memo.setdefault(id(x), made)  # what it holds may hold it
@@ -629,8 +629,8 @@ class _Copies:
 
 def _is_record(kind: Any) -> bool:
     """Whether an object of a type is what its attributes are."""
-    own = ("__reduce_ex__", "__reduce__", "__getstate__")
-    if kind.__dictoffset__ == 0 or any(getattr(kind, name) is not getattr(object, name) for name in own):
+    methods = ("__reduce_ex__", "__reduce__", "__getstate__")
+    if kind.__dictoffset__ == 0 or any(getattr(kind, name) is not getattr(object, name) for name in methods):
         return False
     others = any(hasattr(kind, name) for name in ("__deepcopy__", "__setstate__"))
     return not others and not any(vars(base).get("__slots__") for base in kind.__mro__)

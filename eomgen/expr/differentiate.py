@@ -31,7 +31,7 @@ class Roots:
     def __init__(self) -> None:
         self.of: dict[int, int] = {}
         self._poles: dict[int, int] = {}
-        self.own: dict[int, int] = {}  #: the bit of a root
+        self.bit_of: dict[int, int] = {}  #: the bit of a root
         self._kept: tuple[int, int, dict[int, int]] = (0, 0, {})
         self._seen = 0
 
@@ -56,8 +56,8 @@ class Roots:
             operands = node[1:]
             bits, pole = _of_operation(g, operation, operands), 0
             if bits & ROOT:
-                self.own[i] = ROOT << len(self.own)
-                bits += self.own[i] - ROOT
+                self.bit_of[i] = ROOT << len(self.bit_of)
+                bits += self.bit_of[i] - ROOT
             if result:
                 for k in operands:
                     bits |= result.get(k, 0)
@@ -77,16 +77,16 @@ class Roots:
         """The roots with which a product vanishes."""
         if g.nodes[i][0] == "mul":
             return self._factors(g, g.nodes[i][1]) | self._factors(g, g.nodes[i][2])
-        return self.own.get(i, 0)
+        return self.bit_of.get(i, 0)
 
     def varying(self, active: Container[int]) -> int:
         """The bits of the roots among nodes that vary; the others, such as the scale of lengths, have no slope."""
-        return sum(bit for i, bit in self.own.items() if i in active)
+        return sum(bit for i, bit in self.bit_of.items() if i in active)
 
     def of_varying(self, active: Container[int]) -> dict[int, int]:
         """The bits of all nodes without those of roots that do not vary."""
         live, seen, result = self.varying(active), self._seen, self.of
-        if live and live != sum(self.own.values()):
+        if live and live != sum(self.bit_of.values()):
             if self._kept[:2] != (live, seen):
                 self._kept = live, seen, {i: bits & (live | ROUGH | JUMPS) for i, bits in result.items()}
             result = self._kept[2]
@@ -94,9 +94,9 @@ class Roots:
 
     def vanishes(self, g: Graph, i: int, w: int) -> bool:
         """Whether node i is a root that may vanish, without that making w infinite."""
-        if i in self.own:
+        if i in self.bit_of:
             self.look(g)
-        return bool(self.own.get(i, 0) & ~self._poles.get(w, 0))
+        return bool(self.bit_of.get(i, 0) & ~self._poles.get(w, 0))
 
 
 def roots_in(g: Graph) -> Roots:
@@ -163,8 +163,8 @@ def multiply(
 
 def _tames(result: dict[int, int], w: int, bits: int) -> bool:
     """Whether the derivative of a product exists where its factor w vanishes, the other has these bits."""
-    own = result.get(w, 0)
-    return not own & JUMPS and not (own & ROUGH and bits & (ROUGH | JUMPS))
+    marks = result.get(w, 0)
+    return not marks & JUMPS and not (marks & ROUGH and bits & (ROUGH | JUMPS))
 
 
 def hides(g: Graph, result: dict[int, int], i: int) -> bool:
@@ -233,7 +233,7 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
     ``slopes`` keeps the slopes of functions of one operand from one sweep to the next.
     """
     nodes, roots = g.nodes, roots_in(g)
-    rooted, own, live = roots.of, roots.own, roots.varying(tangents)
+    rooted, bit_of, live = roots.of, roots.bit_of, roots.varying(tangents)
     add, sub, mul = g.add, g.sub, g.mul
     zero, one = g.zero.id, g.one.id
     tangent = tangents.get
@@ -326,8 +326,8 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                     d = add(d, multiply(g, rooted, live, i, slope, p, k, k))
         if d != zero:
             tangents[i] = d
-            if i in own:
-                live |= own[i]
+            if i in bit_of:
+                live |= bit_of[i]
 
 
 def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, int], branches: list[int]) -> None:

@@ -120,7 +120,7 @@ def vanishes(
     plain = [k for k, roots in enumerate(of) if roots is not None]
     result = _vanish([outputs[k] for k in plain], within, unknown)
     passed = {k for k, zero in zip(plain, result, strict=True) if zero}
-    for roots in {own for k in passed if (own := of[k])}:
+    for roots in {each for k in passed if (each := of[k])}:
         alike = [k for k in sorted(passed) if of[k] == roots]
         signed = [outputs[k] for k in alike]
         for root in (Expr(graph, i) for i in sorted(roots)):
@@ -192,12 +192,12 @@ def random_point(outputs: Sequence[Expr], random: np.random.Generator, signs: bo
 def _are_flat(outputs: Sequence[Expr], values: Mapping[str, float]) -> list[bool]:
     """Whether the slopes by each symbol are rounding, also of the terms' own slopes, which folded constants hide."""
     names = [sorted(symbols_of([x])) for x in outputs]
-    slopes = [gradient(x, [x.graph.symbol(name) for name in own]) for x, own in zip(outputs, names, strict=True)]
-    result, bounds = with_bounds([slope for own in slopes for slope in own], values, likely=True)
-    terms = [_slopes_of_terms(x, own, values) for x, own in zip(outputs, names, strict=True)]
-    strict, likely = (np.concatenate([own[k] for own in terms]) if terms else np.empty(0) for k in (0, 1))
+    slopes = [gradient(x, [x.graph.symbol(name) for name in row]) for x, row in zip(outputs, names, strict=True)]
+    result, bounds = with_bounds([slope for row in slopes for slope in row], values, likely=True)
+    terms = [_slopes_of_terms(x, row, values) for x, row in zip(outputs, names, strict=True)]
+    strict, likely = (np.concatenate([row[k] for row in terms]) if terms else np.empty(0) for k in (0, 1))
     zero = iter(is_rounding(result, np.maximum(bounds, np.minimum(strict, CHANCE * likely))))
-    return [bool(np.all([next(zero) for _ in own])) for own in names]
+    return [bool(np.all([next(zero) for _ in row])) for row in names]
 
 
 def _slopes_of_terms(x: Expr, names: Sequence[str], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -259,17 +259,17 @@ def _roots(graph: Graph, outputs: Sequence[Expr]) -> list[frozenset[int] | None]
     """
     analytic = operations_with(lambda row: row.analytic)
     none = frozenset[int]()
-    held: dict[int, frozenset[int] | None] = {}
+    known: dict[int, frozenset[int] | None] = {}
     for i in reachable(graph, (y.id for y in outputs)):
         operation, *operands = graph.nodes[i]
-        inside = [] if operation in LEAVES else [held[k] for k in operands]
-        roots = none.union(*(own for own in inside if own))
+        inside = [] if operation in LEAVES else [known[k] for k in operands]
+        roots = none.union(*(each for each in inside if each))
         if operation == "sqrt":
             fits, roots = not roots, frozenset((i,))
         else:
             fits = operation in LEAVES or operation in analytic
-        held[i] = roots if fits and None not in inside and len(roots) <= ROOTS else None
-    return [held[y.id] for y in outputs]
+        known[i] = roots if fits and None not in inside and len(roots) <= ROOTS else None
+    return [known[y.id] for y in outputs]
 
 
 def rounded_vector(a: Vec3, size: float) -> Vec3:

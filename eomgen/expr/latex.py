@@ -170,17 +170,17 @@ class _Reader:
 
     def __init__(self, text: str) -> None:
         self.text, self.tokens = text, [(m[0], m.start()) for m in _TOKEN.finditer(text)]
-        self.place, self.shown = 0, f"'{visible(text, lines=False)}'"
+        self.place, self.quoted = 0, f"'{visible(text, lines=False)}'"
 
     def whole(self) -> Node:
         if self.text.endswith("\\") and not self.text.endswith("\\\\"):
-            raise NotationError(f"{self.shown} ends in a backslash", "take it away")
+            raise NotationError(f"{self.quoted} ends in a backslash", "take it away")
         result = self.row("", False, 0)
         if self.place < len(self.tokens):
-            raise NotationError(f"{self.shown} has a '}}' without its '{{'", "write as many { as }")
+            raise NotationError(f"{self.quoted} has a '}}' without its '{{'", "write as many { as }")
         if _shows(result):
             return result
-        raise NotationError(f"{self.shown} shows nothing", "write a letter, for example \\theta_1")
+        raise NotationError(f"{self.quoted} shows nothing", "write a letter, for example \\theta_1")
 
     def peek(self) -> str:
         return self.tokens[self.place][0] if self.place < len(self.tokens) else ""
@@ -192,7 +192,7 @@ class _Reader:
     def row(self, closing: str, text_mode: bool, depth: int) -> Node:
         """Parts up to a closing brace, which is left."""
         if depth > DEEPEST:
-            raise NotationError(f"{self.shown} has groups within groups", f"at most {DEEPEST} of them")
+            raise NotationError(f"{self.quoted} has groups within groups", f"at most {DEEPEST} of them")
         parts: list[Node] = []
         start = self.offset
         while (token := self.peek()) and token != "}":
@@ -210,14 +210,14 @@ class _Reader:
                 continue
             parts.append(self.part(text_mode, depth))
         if closing and self.peek() != closing:
-            raise NotationError(f"{self.shown} has a '{{' without its '}}'", "write as many { as }")
+            raise NotationError(f"{self.quoted} has a '{{' without its '}}'", "write as many { as }")
         return parts[0] if len(parts) == 1 else Group(tuple(parts), start, self.offset)
 
     def part(self, text_mode: bool, depth: int) -> Node:
         """A symbol with its scripts."""
         start = self.offset
         if self.peek() in ("_", "^", "'") and not text_mode:
-            raise NotationError(f"{self.shown} has {self.peek()!r} with nothing before it", "write a letter before it")
+            raise NotationError(f"{self.quoted} has {self.peek()!r} with nothing before it", "write a letter before it")
         base = self.single(text_mode, depth)
         sub: Node | None = None
         sup: Node | None = None
@@ -236,7 +236,7 @@ class _Reader:
             elif token == "^" and sup is None and not primes:
                 sup = self.argument("^", False, depth)
             else:
-                raise NotationError(f"{self.shown} has {token!r} twice", "put them together, as in l_{1,2}")
+                raise NotationError(f"{self.quoted} has {token!r} twice", "put them together, as in l_{1,2}")
         if sub is None and sup is None and not primes:
             return base
         return Scripts(base, sub, sup, primes, start, self.offset)
@@ -259,11 +259,11 @@ class _Reader:
     def refuse(self, token: str, text_mode: bool) -> None:
         greek = next((word for word, sign in GREEK.items() if sign == token), "")
         if greek:
-            raise NotationError(f"{self.shown} has the letter {token}", f"write \\{greek}")
+            raise NotationError(f"{self.quoted} has the letter {token}", f"write \\{greek}")
         if text_mode and token in "_^'":
-            raise NotationError(f"{self.shown} has {token!r} in \\text", "write \\mathrm in place of \\text")
+            raise NotationError(f"{self.quoted} has {token!r} in \\text", "write \\mathrm in place of \\text")
         what = f"{token!r}" if token.isprintable() else f"the character U+{ord(token):04X}"
-        raise NotationError(f"{self.shown} has {what}, which no symbol has", "letters, digits, _ ^ { } and commands")
+        raise NotationError(f"{self.quoted} has {what}, which no symbol has", "letters, digits, _ ^ { } and commands")
 
     def command(self, word: str, start: int, text_mode: bool, depth: int) -> Node:
         end = self.offset
@@ -272,7 +272,7 @@ class _Reader:
         if word in SIGNS:
             return Sign(f"\\{word}", SIGNS[word], False, start, end)
         if text_mode:
-            raise NotationError(f"{self.shown} has \\{word} in \\text", "write \\mathrm in place of \\text")
+            raise NotationError(f"{self.quoted} has \\{word} in \\text", "write \\mathrm in place of \\text")
         if word in LETTERS:
             return Sign(f"\\{word}", LETTERS[word], True, start, start + len(word) + 1)
         if word in STYLES:
@@ -285,19 +285,19 @@ class _Reader:
             return Fraction(above, self.argument("\\frac", False, depth), start, self.offset)
         near = hint(word, (*LETTERS, *STYLES, *ACCENTS, *SIGNS, "frac"))
         allowed = "Greek letters, accents such as \\dot and \\vec, styles such as \\mathrm"
-        raise NotationError(f"{self.shown} has \\{word}, which no symbol has", near or allowed)
+        raise NotationError(f"{self.quoted} has \\{word}, which no symbol has", near or allowed)
 
     def argument(self, of: str, text_mode: bool, depth: int) -> Node:
         """A group or a single letter, which a script or a command is of."""
         while self.peek()[:1] == " ":
             self.place += 1
         if self.peek() in ("", "}", "_", "^", "'"):
-            raise NotationError(f"{self.shown} has {of} with nothing after it", f"write {of}{{...}}")
+            raise NotationError(f"{self.quoted} has {of} with nothing after it", f"write {of}{{...}}")
         result = self.single(text_mode, depth)
         if isinstance(result, Group) and len(result.parts) == 1:
             result = result.parts[0]  # the braces belong to the command
         if not _shows(result):
-            raise NotationError(f"{self.shown} has {of}{{}} around nothing", "leave it out")
+            raise NotationError(f"{self.quoted} has {of}{{}} around nothing", "leave it out")
         return result
 
 

@@ -62,8 +62,8 @@ def split_rate(name: str) -> tuple[str, int]:
 
 def literal(name: str, style: str = "mathrm") -> str:
     """The name itself, upright, in LaTeX; what LaTeX does not hold is shown by its number."""
-    shown = _SPECIAL.sub(lambda c: f"(U+{ord(c[0]):04X})", visible(name, lines=False)) or "?"
-    return rf"\{style}{{{_ESCAPED.sub(lambda c: chr(92) + c[0], shown)}}}".replace(" ", r"\ ")
+    text = _SPECIAL.sub(lambda c: f"(U+{ord(c[0]):04X})", visible(name, lines=False)) or "?"
+    return rf"\{style}{{{_ESCAPED.sub(lambda c: chr(92) + c[0], text)}}}".replace(" ", r"\ ")
 
 
 def latex_of(name: str) -> str:
@@ -79,10 +79,10 @@ def latex_of(name: str) -> str:
         return _with(head, [*subs, result[2]])
     if result := _CALL.match(name):
         return f"{_with(*_head_and_subs(result[1]))}({literal(result[2]) if result[2] else ''})"
-    path, _, own = name.rpartition(".")
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.]*", name, re.ASCII) or not own.strip("_"):
+    path, _, last = name.rpartition(".")
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_.]*", name, re.ASCII) or not last.strip("_"):
         return literal(name)
-    head, subs = _head_and_subs(own)
+    head, subs = _head_and_subs(last)
     return _with(head, [*subs, *([literal(path)] if path else [])])
 
 

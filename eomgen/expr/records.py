@@ -31,13 +31,13 @@ def _freeze(kind: type) -> type:
     if not all(field.init and field.compare and field.hash is None for field in fields):
         raise TypeError(f"a field of {kind.__qualname__} needs the standard library's dataclass")
     names = tuple(field.name for field in fields)
-    shown = tuple(field.name for field in fields if field.repr)
+    in_repr = tuple(field.name for field in fields if field.repr)
 
     def values(record: Any) -> tuple[Any, ...]:
         return tuple([getattr(record, name) for name in names])
 
     def __repr__(self: Any) -> str:
-        return f"{type(self).__qualname__}({', '.join(f'{name}={getattr(self, name)!r}' for name in shown)})"
+        return f"{type(self).__qualname__}({', '.join(f'{name}={getattr(self, name)!r}' for name in in_repr)})"
 
     def __eq__(self: Any, other: object) -> Any:
         return values(self) == values(other) if type(other) is type(self) else NotImplemented
@@ -55,12 +55,12 @@ def _freeze(kind: type) -> type:
             raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
         super(made, self).__delattr__(name)
 
-    own = vars(kind)
+    members = vars(kind)
     for method in (__repr__, __eq__, __hash__):
-        if own.get(method.__name__) is None:  # Python itself sets __hash__ to None beside an __eq__
+        if members.get(method.__name__) is None:  # Python itself sets __hash__ to None beside an __eq__
             setattr(made, method.__name__, method)
     made.__setattr__, made.__delattr__ = __setattr__, __delattr__
-    if "__init__" not in own:
+    if "__init__" not in members:
         made.__init__ = _Init(made, fields)
     return cast("type", made)
 
@@ -85,7 +85,7 @@ class _Init:
 
     def fill(self, record: Any, *args: Any, **named: Any) -> None:
         """Set the fields; whatever does not fit is left to the compiled function, which says so."""
-        held, values, rest = vars(record), iter(args), dict(named)
+        members, values, rest = vars(record), iter(args), dict(named)
         for field in self.fields:
             name = field.name
             value = next(values, dataclasses.MISSING)
@@ -96,7 +96,7 @@ class _Init:
                     if make is dataclasses.MISSING:
                         return self.compiled()(record, *args, **named)  # type: ignore[no-any-return]
                     value = make()
-            held[name] = value
+            members[name] = value
         if rest or len(args) > len(self.fields):
             return self.compiled()(record, *args, **named)  # type: ignore[no-any-return]
         if hasattr(record, "__post_init__"):

@@ -137,7 +137,7 @@ def _registers(graph: Graph, roots: Sequence[int]) -> dict[int, int]:
             need[i] = (a if a > b else b if b > a else a + 1) or 1
         else:
             ranked = sorted((need[k] for k in node[1:]), reverse=True)
-            need[i] = max(1, *(n + held for held, n in enumerate(ranked)))
+            need[i] = max(1, *(n + waiting for waiting, n in enumerate(ranked)))
     return need
 
 

@@ -90,13 +90,13 @@ def row_velocities(kinematics: Kinematics) -> tuple[tuple[int, ...], ...]:
     known[len(c.values) :] = [set(range(n))] * c.nonholonomic
     of_gaps: dict[int, set[int]] = {}
     groups = row_groups(kinematics)
-    for group, own in zip(groups, known, strict=True):
+    for group, labels in zip(groups, known, strict=True):
         if group > 0:
-            of_gaps.setdefault(group, set()).update(own)
-    result = [of_gaps[group] if group > 0 else own for group, own in zip(groups, known, strict=True)]
-    if kinematics.general_rates or all(len(own) == n for own in result):
+            of_gaps.setdefault(group, set()).update(labels)
+    result = [of_gaps[group] if group > 0 else labels for group, labels in zip(groups, known, strict=True)]
+    if kinematics.general_rates or all(len(labels) == n for labels in result):
         return ()
-    return tuple(tuple(sorted(own)) for own in result)
+    return tuple(tuple(sorted(labels)) for labels in result)
 
 
 # -- row scales --------------------------------------------------------------------------------------------------------
@@ -136,8 +136,8 @@ def _find_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
     zero = graph.zero.id
     measured: dict[int, list[Expr]] = {}  # gradients whose lengths are looked at, by row
     for i, row in enumerate(c.jacobian):
-        held = ((x, kind) for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if x.id != zero)
-        gradient = [x * sizes[kind] for x, kind in held]
+        entries = ((x, kind) for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if x.id != zero)
+        gradient = [x * sizes[kind] for x, kind in entries]
         written = c.written[i]
         if not gradient or (not written and c.kinds[i] != "length"):
             continue
@@ -295,9 +295,9 @@ class ConstraintFunctions:
     ) -> Callable[[Array, float], tuple[Array, Array]]:
         """Functions and their slopes (n_v wide by default) in one evaluation; those that vanish are not evaluated."""
         zero, k, shape = self.kinematics.graph.zero.id, len(values), (len(slopes), self.n if width is None else width)
-        held = [(i, j, e) for i, row in enumerate(slopes) for j, e in enumerate(row) if e.id != zero]
-        rows, columns = [i for i, _, _ in held], [j for _, j, _ in held]
-        evaluate = self._compile([*values, *(e for _, _, e in held)])
+        entries = [(i, j, e) for i, row in enumerate(slopes) for j, e in enumerate(row) if e.id != zero]
+        rows, columns = [i for i, _, _ in entries], [j for _, j, _ in entries]
+        evaluate = self._compile([*values, *(e for _, _, e in entries)])
 
         def call(q: Array, t: float) -> tuple[Array, Array]:
             result, matrix = evaluate(q, t), np.zeros(shape)
@@ -348,10 +348,10 @@ class ConstraintFunctions:
 
     def close_nearest(self, declared: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
         """Assemble with the given values exact, on the branch that is nearest to the guess."""
-        settled = self.system.settle(declared), self.system.settle(guess)
-        known = {**settled[0], **settled[1]}
+        values = self.system.settle(declared), self.system.settle(guess)
+        known = {**values[0], **values[1]}
         if guess:
-            result = close_nearest(self.system, self.neutral, *settled, lambda q: self._hinted(q, known, self.system.t))
+            result = close_nearest(self.system, self.neutral, *values, lambda q: self._hinted(q, known, self.system.t))
             if result is not None:
                 return result
         return self.close(declared, guess)

@@ -114,9 +114,9 @@ class Kinematics(MotionSymbols):
         """Of each clock ``t``, the time of its next sample, then its states with their new values."""
         raw = {s.name: s.sampled for s in self.mechanism.states if s.sampled is not None}
         result: list[tuple[str, Expr]] = []
-        for own in self.mechanism.clocks:
-            result.append(("t", own.offset + own.period * self.graph.symbol(own.counter)))
-            result += ((name, raw[name]) for name in own.states)
+        for clock in self.mechanism.clocks:
+            result.append(("t", clock.offset + clock.period * self.graph.symbol(clock.counter)))
+            result += ((name, raw[name]) for name in clock.states)
         return tuple(zip((name for name, _ in result), self.resolve([x for _, x in result]), strict=True))
 
     @property

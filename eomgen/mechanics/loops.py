@@ -138,10 +138,10 @@ def _in_plane(gap: Vec3, axis: Vec3) -> Vec3:
     graph = gap[0].graph
     if any(vanishes(gap)):
         return gap
-    across = np.array(evaluate(axis, random_point(axis, np.random.default_rng(5))), dtype=float)
-    first = np.cross(across, np.eye(3)[int(np.argmin(np.abs(across)))])
+    axle = np.array(evaluate(axis, random_point(axis, np.random.default_rng(5))), dtype=float)
+    first = np.cross(axle, np.eye(3)[int(np.argmin(np.abs(axle)))])
     first /= np.linalg.norm(first)
-    rows = [[graph.constant(x) for x in row.tolist()] for row in (first, np.cross(across, first), across)]
+    rows = [[graph.constant(x) for x in row.tolist()] for row in (first, np.cross(axle, first), axle)]
     turned = [vec.dot((x, y, z), gap) for x, y, z in rows]
     return (turned[0], turned[1], turned[2]) if vanishes(turned[2:])[0] else gap
 

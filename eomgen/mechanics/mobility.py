@@ -382,11 +382,11 @@ def _check_places(functions: ConstraintFunctions, q: Array, places: Sequence[str
     if not places:
         return
     kinematics, names, J = functions.kinematics, functions.kinematics.names, functions.place_jacobian(q)
-    rank, held = SparseRows(J).rank, np.eye(len(names))[[names.index(name) for name in places]]
+    rank, units = SparseRows(J).rank, np.eye(len(names))[[names.index(name) for name in places]]
     if len(places) > (n := len(names) - rank) or len({*places}) < len(places):
         message = f"{', '.join(places)}: the positions have {n} degree{'s' * (n != 1)} of freedom"
         raise ModelError([_choice(kinematics, message, f"choose {n} different ones of {', '.join(names)}")])
-    if SparseRows(np.vstack([J, held])).rank < rank + len(places):
+    if SparseRows(np.vstack([J, units])).rank < rank + len(places):
         message = f"{', '.join(places)} cannot vary independently of each other at the initial configuration"
         raise ModelError([_choice(kinematics, message, f"choose others of {', '.join(names)}")])
 

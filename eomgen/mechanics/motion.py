@@ -210,9 +210,9 @@ class Momentum:
         o = vec.zero(self.graph)
         total: Mat3 = (o, o, o)
         for k, link in enumerate(self.links):
-            own = rotate_symmetric(self.poses.link(k).rotation, link.inertia)
+            central = rotate_symmetric(self.poses.link(k).rotation, link.inertia)
             arm = vec.sub(self._centre(k), self.centre)
-            total = add_matrices(total, add_matrices(own, shift_tensor(link.mass, arm)))
+            total = add_matrices(total, add_matrices(central, shift_tensor(link.mass, arm)))
         return total
 
     def inertia_about(self, point: Vec3) -> Mat3:

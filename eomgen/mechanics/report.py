@@ -58,10 +58,10 @@ def other_branches(kinematics: Kinematics, mobility: Mobility) -> list[dict[str,
     initial = {name: x for name, x in initial_values(kinematics, functions.values).items() if name in known}
     kinds = dict(zip(kinematics.names, kinematics.kinds, strict=True))
     guessed = [name for name in mechanism.defaults.guess if name in known and kinds.get(name) != "parameter"]
-    held = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
+    fixed = dict(zip(guessed, system.measure(guessed, here)[0].tolist(), strict=True))
     at = dict(zip(kinematics.names, mobility.q_reference, strict=True))
-    held |= {name: at[name] for name in mobility.independent if name in at}
-    equations, names = system.closure(system.settle({**held, **initial})), [n for n in single if n in known]
+    fixed |= {name: at[name] for name in mobility.independent if name in at}
+    equations, names = system.closure(system.settle({**fixed, **initial})), [n for n in single if n in known]
     values, _ = system.measure(names, here)
     sizes, angles = _sizes(functions, names)
     result: list[Array] = []
@@ -107,9 +107,9 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
             "confirm with gravity (0, 0, 0)"
         )
     if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
-        held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
+        constraints = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
         notes.append(
-            f"locked: the mechanism has no degree of freedom, and no driver moves it (held by {held}); "
+            f"locked: the mechanism has no degree of freedom, and no driver moves it (held by {constraints}); "
             "if it should move, remove a constraint, or replace a joint by one with more freedom"
         )
     follow = f"{_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from"
@@ -191,11 +191,11 @@ def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
     """Bodies with one moment of inertia, as in a plane, whose joints turn them about other axes too."""
     motion = kinematics.motion
     bodies = [(k, body) for k, body in enumerate(kinematics.mechanism.bodies) if body.plane is not None]
-    across: list[Expr] = []
+    tilts: list[Expr] = []
     for k, body in bodies:
         spin = motion.turning_of(motion.body(k), own_axes=True, rate=False)
-        across += vec.cross(spin, body.plane or spin)
-    zero = vanishes(across, ACROSS, pieces=True, unknown=True)
+        tilts += vec.cross(spin, body.plane or spin)
+    zero = vanishes(tilts, ACROSS, pieces=True, unknown=True)
     return [body.name for k, (_, body) in enumerate(bodies) if not all(zero[3 * k : 3 * k + 3])]
 
 
@@ -212,8 +212,8 @@ def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:
-    shown = ", ".join(names[:SHOWN])
-    return shown if len(names) <= SHOWN else f"{shown}, ... ({len(names) - SHOWN} more)"
+    listed = ", ".join(names[:SHOWN])
+    return listed if len(names) <= SHOWN else f"{listed}, ... ({len(names) - SHOWN} more)"
 
 
 # -- report -----------------------------------------------------------------------------------------------------------

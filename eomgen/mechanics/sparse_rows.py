@@ -273,8 +273,8 @@ def _pivots(rows: Array, count: int, order: Sequence[int]) -> set[int]:
         chosen.add(column)
         direction = work[:, column] / (length[column] or 1.0)
         moved = np.flatnonzero(along := direction @ work)  # few, where each loop has coordinates of its own
-        held = np.flatnonzero(direction)
-        work[np.ix_(held, moved)] -= np.outer(direction[held], along[moved])
+        support = np.flatnonzero(direction)
+        work[np.ix_(support, moved)] -= np.outer(direction[support], along[moved])
     return chosen
 
 

@@ -52,8 +52,8 @@ def switched_rows(kinematics: Kinematics) -> tuple[list[SwitchedRow], list[Force
     """The equations of all constraints that close and open, and the loads of their multipliers."""
     rows, loads = list[SwitchedRow](), list[ForceTerms]()
     for switch in kinematics.mechanism.switched:
-        own, terms = _of_one(kinematics, switch)
-        rows += own
+        of_switch, terms = _of_one(kinematics, switch)
+        rows += of_switch
         loads.append(terms)
     return rows, loads
 

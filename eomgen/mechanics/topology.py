@@ -164,9 +164,9 @@ def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[
             message = f"a {spec.joint.type_name} joint cannot close a loop, and all joints of its loop are of that kind"
             remedy = "use another type for one joint of the loop"
             problems.append(mechanism.problem(f"joints.{spec.name}", message, remedy, "EG-TOPOLOGY"))
-    held = {branch.body for branch in branches}
+    moved = {branch.body for branch in branches}
     for k, body in enumerate(mechanism.bodies):
-        if k not in held:
+        if k not in moved:
             problems.append(mechanism.problem(f"bodies.{body.name}", *UNHELD, code="EG-TOPOLOGY"))
     if problems:
         raise ModelError(problems)

@@ -33,8 +33,8 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | Non
     """
     angle = atan2(rotation[1][0], rotation[0][0])
     places = {x.id: j for j, x in enumerate(q)}
-    held = (graph.symbol(name).id for name in symbols_of([angle]))
-    turning = sorted(places[i] for i in held if i in places)
+    symbols = (graph.symbol(name).id for name in symbols_of([angle]))
+    turning = sorted(places[i] for i in symbols if i in places)
     slopes = gradient(angle, [q[j] for j in turning])
     random = np.random.default_rng(7)
     points = (random_point(slopes, random) for _ in range(DRAWS if slopes else 1))
@@ -219,12 +219,12 @@ def build_links(
             columns = [_reverse(rotation, position, column) for column in columns]
             position = vec.neg(vec.transpose_times(rotation, position))
             rotation = vec.transpose(rotation)
-        held, frame = outer.frame, inner.frame
-        holder = place(frames[branch.parent], held)
+        outer_frame, frame = outer.frame, inner.frame
+        holder = place(frames[branch.parent], outer_frame)
         turn = choose(branch, holder.rotation, frame)
         if turn is not None:
-            held, frame = held.turned(turn), frame.turned(turn)
-            holder = place(frames[branch.parent], held)
+            outer_frame, frame = outer_frame.turned(turn), frame.turned(turn)
+            holder = place(frames[branch.parent], outer_frame)
         body = mechanism.bodies[branch.body]
         back = vec.transpose(frame.rotation)
         links.append(
@@ -320,8 +320,8 @@ class Poses:
     def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
         """Placement of a link in link ``base``, one of its ancestors, or in a constant frame ``within`` that link."""
         if link == base:
-            own = Frame.identity(self.graph)
-            return own if within is None else place(within, own)
+            identity = Frame.identity(self.graph)
+            return identity if within is None else place(within, identity)
         key = (link, base, None if within is None else (within.rotation, within.position))
         if key not in self._known:
             missing = [link]

@@ -363,9 +363,9 @@ class JointWrenches:
             frame = self.kinematics.poses.link(k)
             shift, turn = moves[link.body]
             arm = vec.sub(frame.position, self.origins[link.body])
-            own = vec.transpose_times(frame.rotation, turn)
+            spin = vec.transpose_times(frame.rotation, turn)
             moved = vec.transpose_times(frame.rotation, vec.add(shift, vec.cross(turn, arm)))
-            twists.append((vec.add(angular, own), vec.add(linear, moved)))
+            twists.append((vec.add(angular, spin), vec.add(linear, moved)))
         return twists
 
     @cached_property

@@ -118,8 +118,8 @@ def grouped(
     for symbol, x in named:
         below = [level[s] if s in level else _level(s.name, constants, moving) for s in inside[symbol]]
         level[symbol] = max(below, default=0)
-        own = known.get(symbol.name) or _meaning(x, level[symbol], uses[symbol])
-        meaning[symbol] = max([own, *(meaning[s] for s in inside[symbol] if s in meaning)])
+        known_meaning = known.get(symbol.name) or _meaning(x, level[symbol], uses[symbol])
+        meaning[symbol] = max([known_meaning, *(meaning[s] for s in inside[symbol] if s in meaning)])
         groups.setdefault(meaning[symbol], []).append((symbol, x))
     return dict(sorted(groups.items()))
 
@@ -137,9 +137,9 @@ def _uses(
             for symbol in x.free_symbols & uses.keys():
                 uses[symbol].add(meaning)
     for symbol, _ in reversed(named):
-        own = {known[symbol.name]} if symbol.name in known else uses[symbol]
+        users = {known[symbol.name]} if symbol.name in known else uses[symbol]
         for part in inside[symbol] & uses.keys():
-            uses[part] |= own
+            uses[part] |= users
     return uses
 
 
@@ -161,10 +161,10 @@ def _meaning(x: Any, level: int, uses: set[PartMeaning]) -> PartMeaning:
     )
     if body and row:
         return PartMeaning.POSITION if level == 1 else PartMeaning.VELOCITY
-    own = body or row
-    if level == 1 and len(own) > 1:
-        own = own & {PartMeaning.INERTIA, PartMeaning.CONSTRAINT}
-    return max(own, default=PartMeaning.FORCE)
+    chosen = body or row
+    if level == 1 and len(chosen) > 1:
+        chosen = chosen & {PartMeaning.INERTIA, PartMeaning.CONSTRAINT}
+    return max(chosen, default=PartMeaning.FORCE)
 
 
 # -- blocks of matrices ------------------------------------------------------------------------------------------------

@@ -221,8 +221,8 @@ def _move(quantities: Quantities, column: Row) -> _Move:
     moved = substitute(list(kinematics.rates), dict(zip(kinematics.v, column, strict=True)))
     dq = {q: x - rest for q, x, rest in zip(kinematics.q, moved, still, strict=True) if x != rest}
     result = quantities.transformation
-    own = [kinematics.v[kinematics.velocity_labels.index(name)] for name in quantities.mobility.independent]
-    v = [dot(row, own) + b if own else b for row, b in zip(result.matrix, result.offset, strict=True)]
+    independent = [kinematics.v[kinematics.velocity_labels.index(name)] for name in quantities.mobility.independent]
+    v = [dot(row, independent) + b if independent else b for row, b in zip(result.matrix, result.offset, strict=True)]
     return _Move(dq, tuple(jvp(v, dq)) if dq else (graph.zero,) * len(v))
 
 
@@ -231,6 +231,6 @@ def _shift(quantities: Quantities, move: _Move, column: Row) -> Row:
     result = list(move.velocities)
     for _, j in quantities.kinematics.quaternion_slots:
         w, r = (vec.vector(quantities.graph, x[j : j + 3]) for x in (quantities.kinematics.v, column))
-        own = vec.vector(quantities.graph, result[j : j + 3])
-        result[j : j + 3] = vec.add(own, vec.cross(r, w))
+        linear = vec.vector(quantities.graph, result[j : j + 3])
+        result[j : j + 3] = vec.add(linear, vec.cross(r, w))
     return tuple(result)

@@ -123,12 +123,12 @@ def _drawn(scene: Scene, pulls: Sequence[Pull]) -> Scene:
 
 def arrows(tails: Array, ways: Array, view: Array | None) -> Array:
     """Lines (k, 5, 3) that look like arrows from tails (k, 3) along ways (k, 3)."""
-    across = np.cross(ways, np.eye(3)[0] if view is None else view[2])
+    sides = np.cross(ways, np.eye(3)[0] if view is None else view[2])
     length = np.linalg.norm(ways, axis=1, keepdims=True)
-    size = np.linalg.norm(across, axis=1, keepdims=True)
-    across = np.where(size > SAME * length, across * length / np.maximum(size, NOTHING), np.roll(ways, 1, axis=1))
+    size = np.linalg.norm(sides, axis=1, keepdims=True)
+    sides = np.where(size > SAME * length, sides * length / np.maximum(size, NOTHING), np.roll(ways, 1, axis=1))
     tips = tails + ways
-    left, right = (tips - HEAD * (ways + side * 0.6 * across) for side in (1.0, -1.0))
+    left, right = (tips - HEAD * (ways + side * 0.6 * sides) for side in (1.0, -1.0))
     return np.stack([tails, tips, left, tips, right], axis=1)
 
 
@@ -239,8 +239,8 @@ def amplitude(module: Any, q: Array, direction: Array) -> float:
     points = attachments(data)
     moved, places = 0.0, []
     for k in range(len(data.bodies)):
-        own = np.array([*points[k], data.com[k]])
-        here, there = (pose[k, :3, :3] @ own.T + pose[k, :3, 3:] for pose in (before, after))
+        outline = np.array([*points[k], data.com[k]])
+        here, there = (pose[k, :3, :3] @ outline.T + pose[k, :3, 3:] for pose in (before, after))
         moved = max(moved, float(np.linalg.norm(there - here, axis=0).max()) / step)
         places.append(here.T)
     every = np.vstack([*places, *([np.array(points[-1])] if len(points[-1]) else [])])

@@ -467,12 +467,12 @@ class Flat:
 def joined_limits(ax: Any, axes: str, limits: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Limits that a picture needs, wide enough for what is on the axes already and turned round where theirs are."""
     result = []
-    for name, own in zip(axes, limits, strict=True):
+    for name, limit in zip(axes, limits, strict=True):
         theirs = (
-            getattr(ax, f"get_{name}lim")() if ax.has_data() or not getattr(ax, f"get_autoscale{name}_on")() else own
+            getattr(ax, f"get_{name}lim")() if ax.has_data() or not getattr(ax, f"get_autoscale{name}_on")() else limit
         )
-        low, high = min(*own, *theirs), max(*own, *theirs)
-        turned = own[0] > own[1] or theirs[0] > theirs[1]
+        low, high = min(*limit, *theirs), max(*limit, *theirs)
+        turned = limit[0] > limit[1] or theirs[0] > theirs[1]
         result.append((high, low) if turned else (low, high))
     return result
 

@@ -82,8 +82,8 @@ def build_scene(
     for name, marker in zip(trace, tracked, strict=True):
         way = np.array([placed(now, marker)[1] for now in frames])
         items.append(Item("trace", name, GROUND, way))
-    shown = len(data.bodies) + len(data.joints) <= MANY if names is None else names
-    labels = _labels(data, points) if shown else []
+    named = len(data.bodies) + len(data.joints) <= MANY if names is None else names
+    labels = _labels(data, points) if named else []
     low, high = _bounds(items, frames, view)
     return Scene(data.name, items, labels, view, up, symbol, frames, low, high)
 
@@ -133,10 +133,10 @@ def _labels(data: PictureData, points: list[Array]) -> list[Label]:
     for k, name in enumerate(data.bodies):
         if k in data.hidden:
             continue
-        own = distinct(points[k], ROUNDED)
-        middle = data.com[k] if data.mass[k] > 0.0 or not len(own) else own.mean(axis=0)
-        if len(own) >= 2:
-            middle = own.mean(axis=0)
+        places = distinct(points[k], ROUNDED)
+        middle = data.com[k] if data.mass[k] > 0.0 or not len(places) else places.mean(axis=0)
+        if len(places) >= 2:
+            middle = places.mean(axis=0)
         labels.append(Label(name, k, middle, "body"))
     return labels
 

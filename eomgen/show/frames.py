@@ -84,10 +84,10 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
     if len(t) < 2:
         raise cannot("the run has only one point, so there is no motion to show; draw its state with module.draw(x)")
     if t[0] == t[-1]:  # a range of coordinates at one time
-        led = trajectory.metadata.get("led") or trajectory.x_names[:1]
-        over, unit = trajectory[led[0]], trajectory.units.get(led[0], "")
-        said = [f"{led[0]} = {value:.3f} {unit}" for value in over]
-        across = label(Notation.of(trajectory.metadata).mathtext(led[0]), unit)
+        prescribed = trajectory.metadata.get("led") or trajectory.x_names[:1]
+        over, unit = trajectory[prescribed[0]], trajectory.units.get(prescribed[0], "")
+        said = [f"{prescribed[0]} = {value:.3f} {unit}" for value in over]
+        across = label(Notation.of(trajectory.metadata).mathtext(prescribed[0]), unit)
         return MotionFrames(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over, across)
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)

@@ -88,8 +88,8 @@ def _shapes(scene: Scene, module: Any) -> list[Array]:
     """The points of all items, then those of the names, then the markers: what changes with parameters."""
     result = []
     for item in _drawn(scene):
-        own = item.points if item.follow is None else getattr(item.follow, "shape", np.empty((0, 3)))
-        result.append(np.vstack([*(frame.position[None] for frame, _, _ in _stops(item)), own]))
+        shape = item.points if item.follow is None else getattr(item.follow, "shape", np.empty((0, 3)))
+        result.append(np.vstack([*(frame.position[None] for frame, _, _ in _stops(item)), shape]))
     markers = [frame.position for _, frame in _markers(module)]
     return [*result, np.array([label.point for label in scene.labels]).reshape(-1, 3), *markers]
 

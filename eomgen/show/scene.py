@@ -385,23 +385,23 @@ def link_items(
         if k in shaped or k in hidden:
             continue
         hollows = hollow_lines(data, k)
-        own = distinct(points[k], NEAR * extent)
+        places = distinct(points[k], NEAR * extent)
         if hollows:  # the hull of all points would hide them
             items += [Item("shape", name, k, *hollow_plate(line, BAR * symbol), convex=False) for line in hollows]
-            on_lines = np.abs(own[:, None] - np.vstack(hollows)).max(axis=2).min(axis=1) <= NEAR * extent
-            own = own[~on_lines]
-            if len(own) < 2:
+            on_lines = np.abs(places[:, None] - np.vstack(hollows)).max(axis=2).min(axis=1) <= NEAR * extent
+            places = places[~on_lines]
+            if len(places) < 2:
                 continue
         com = data.com[k]
-        if k in rods - blocks and len(own) == 1 and _telescopes(data, k, symbol):
+        if k in rods - blocks and len(places) == 1 and _telescopes(data, k, symbol):
             continue  # a barrel or a rod, which its joint draws
-        if data.mass[k] > 0.0 and len(own) == 1 and np.linalg.norm(com - own[0]) > 0.5 * symbol:
-            own = np.vstack([own, com])
+        if data.mass[k] > 0.0 and len(places) == 1 and np.linalg.norm(com - places[0]) > 0.5 * symbol:
+            places = np.vstack([places, com])
             items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))  # the mass at the end of a rod
-        if len(own) >= 2 and data.mass[k] > 0.0 and _off(com, own) > OFF * np.linalg.norm(np.ptp(own, axis=0)):
-            own = np.vstack([own, com])  # most of the body is there
-        if len(own) >= 2:
-            bar = rounded(own, BAR * symbol)
+        if len(places) >= 2 and data.mass[k] > 0.0 and _off(com, places) > OFF * np.linalg.norm(np.ptp(places, axis=0)):
+            places = np.vstack([places, com])  # most of the body is there
+        if len(places) >= 2:
+            bar = rounded(places, BAR * symbol)
             if bar is not None:
                 items.append(Item("link", name, k, *bar))
         elif k not in blocks and k not in wheels and data.mass[k] > 0.0:
@@ -410,7 +410,7 @@ def link_items(
                 items += uniform
             else:
                 items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))
-        if data.mass[k] > 0.0 and len(points[k]) >= 2 and len(own) >= 2:
+        if data.mass[k] > 0.0 and len(points[k]) >= 2 and len(places) >= 2:
             items.append(Item("com", name, k, *_moved(sphere(0.3 * symbol), com)))
     return items
 
@@ -512,9 +512,9 @@ def color_of(item: Item | Label) -> str:
         return item.color
     if item.role == "frame":
         return AXES[item.name] if isinstance(item, Item) else DARK
-    own = STYLES[item.role].color if isinstance(item, Item) else None
-    if own is not None and not (item.role == "wheel" and isinstance(item, Item) and item.faces is not None):
-        return own
+    color = STYLES[item.role].color if isinstance(item, Item) else None
+    if color is not None and not (item.role == "wheel" and isinstance(item, Item) and item.faces is not None):
+        return color
     return BODIES[item.body % len(BODIES)] if item.body != GROUND else "#888888"
 
 

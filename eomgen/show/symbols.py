@@ -124,9 +124,9 @@ def wall_items(data: PictureData, view: Array | None, symbol: float, poses: Arra
             away = away - (away @ view[2]) * view[2]
             length = float(np.linalg.norm(away))
             away = -view[1] if length == 0.0 else away / length
-            across = np.cross(view[2], away)
+            along = np.cross(view[2], away)
             reach = 2.2 * symbol
-            items.append(_hatching(element["name"], here - reach * across, here + reach * across, away, symbol))
+            items.append(_hatching(element["name"], here - reach * along, here + reach * along, away, symbol))
     return items
 
 
@@ -166,8 +166,8 @@ class Stretched:
         (turn, a), (_, b) = placed(poses, self.start), placed(poses, self.end)
         way = b - a
         length = float(np.linalg.norm(way))
-        across, other = _across(way / length if length > 0.0 else turn[:, 2], self.view)
-        points: Array = a + self.shape @ np.array([way, across, other])
+        side, other = _across(way / length if length > 0.0 else turn[:, 2], self.view)
+        points: Array = a + self.shape @ np.array([way, side, other])
         return points
 
 
@@ -276,10 +276,10 @@ def _end(data: PictureData, joint: JointData) -> Array | None:
     if k == GROUND:
         return None
     every = np.vstack([attachments(data)[k], data.com[k : k + 1] if data.mass[k] > 0.0 else np.empty((0, 3))])
-    own = (every - joint.S.position) @ joint.S.rotation
-    reach = np.hypot(own[:, 0], own[:, 1])
+    local = (every - joint.S.position) @ joint.S.rotation
+    reach = np.hypot(local[:, 0], local[:, 1])
     far = int(np.argmax(reach))
-    return own[far] if reach[far] > SAME else None
+    return local[far] if reach[far] > SAME else None
 
 
 def contour_items(element: dict[str, Any], poses: Array) -> list[Item]:
@@ -378,9 +378,9 @@ def _lines(
         points = move_frame(frames[0], _broken(lines))
         return [Item("force", name, frames[0].body, points)]
     if element.get("walls"):
-        across, _ = _across(np.array([0.0, 0.0, 1.0]), None if view is None else view @ placed(poses, frames[0])[0])
+        lateral, _ = _across(np.array([0.0, 0.0, 1.0]), None if view is None else view @ placed(poses, frames[0])[0])
         near = [z for z in element["walls"] if abs(z) <= FAR * symbol] or [0.0]
-        lines = [np.array([[0.0, 0.0, z] + side * WALL * symbol * across for side in (1.0, -1.0)]) for z in near]
+        lines = [np.array([[0.0, 0.0, z] + side * WALL * symbol * lateral for side in (1.0, -1.0)]) for z in near]
         return [Item("force", name, frames[0].body, move_frame(frames[0], _broken(lines)))]
     if len(frames) < 2 or (element.get("joint") is not None and not element["along"]):
         return []
@@ -405,11 +405,11 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
 
     rotation, place = placed(poses, marker)
     along = (rotation @ way if element["own"] else way) / size
-    across, other = _across(along, view)
+    side, other = _across(along, view)
     if element["turns"]:  # counterclockwise, seen against the axis
         points = symbol * (shape[:, :1] * other + shape[:, 1:2] * np.cross(along, other))
     else:
-        points = symbol * (LONG * (shape[:, :1] - 1.0) * along + shape[:, 1:2] * across)
+        points = symbol * (LONG * (shape[:, :1] - 1.0) * along + shape[:, 1:2] * side)
     if element["own"]:  # it turns with its marker
         return [Item("pull", element["name"], marker.body, move_frame(marker, points @ rotation))]
     return [Item("pull", element["name"], GROUND, place + points, None, Shifted(marker, points))]
@@ -418,14 +418,14 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
 def _across(along: Array, view: Array | None) -> tuple[Array, Array]:
     """Two unit vectors across a direction, the first on the page."""
     other = np.eye(3)[int(np.argmin(np.abs(along)))] if view is None else view[2]
-    across = np.cross(other, along)
-    length = float(np.linalg.norm(across))
+    side = np.cross(other, along)
+    length = float(np.linalg.norm(side))
     if length < ROUNDED:  # seen end on
         other = view[0] if view is not None else np.eye(3)[0]
-        across = np.cross(other, along)
-        length = float(np.linalg.norm(across))
-    across = across / length
-    return across, np.cross(along, across)
+        side = np.cross(other, along)
+        length = float(np.linalg.norm(side))
+    side = side / length
+    return side, np.cross(along, side)
 
 
 def _broken(lines: Sequence[Array]) -> Array:
@@ -467,7 +467,7 @@ def _wound(poses: Array, frame: PlacedFrame, r: float, sense: int, a: Array, b: 
     begin = np.arctan2(p[1], p[0]) + sense * np.arccos(r / far[0])
     end = np.arctan2(q[1], q[0]) - sense * np.arccos(r / far[1])
     angle = sense * (end - begin) % (2 * np.pi)
-    across = np.array([np.sqrt(far[0] ** 2 - r * r), r * angle, np.sqrt(far[1] ** 2 - r * r)])
+    spans = np.array([np.sqrt(far[0] ** 2 - r * r), r * angle, np.sqrt(far[1] ** 2 - r * r)])
     direct = q[:2] - p[:2]
     closest = abs(p[0] * q[1] - p[1] * q[0]) / max(float(np.hypot(*direct)), NOTHING)
     ahead = -p[:2] @ direct > 0.0 and q[:2] @ direct > 0.0
@@ -475,7 +475,7 @@ def _wound(poses: Array, frame: PlacedFrame, r: float, sense: int, a: Array, b: 
     if (angle > np.pi and not (ahead and closest < r)) or (not left and not (ahead and closest < r) and angle > np.pi):
         return straight
     angles = begin + sense * angle * part[:, 0]
-    steps = (across[0] + across[1] * part[:, 0]) / across.sum()
+    steps = (spans[0] + spans[1] * part[:, 0]) / spans.sum()
     local = np.column_stack([r * np.cos(angles), r * np.sin(angles), p[2] + (q[2] - p[2]) * steps])
     wound: Array = local @ turn.T + center
     return wound
@@ -547,10 +547,10 @@ def _belt(poses: Array, first: PlacedFrame, second: PlacedFrame, r_a: float, r_b
     along = b - a
     distance = float(np.linalg.norm(along))
     along = along / distance
-    across = np.cross(turn[:, 2], along)
+    lateral = np.cross(turn[:, 2], along)
     lean = np.arccos(np.clip((r_a - r_b if opened else r_a + r_b) / distance, -1.0, 1.0))
     result = []
     for side in (1.0, -1.0):
-        normal = np.cos(lean) * along + side * np.sin(lean) * across
+        normal = np.cos(lean) * along + side * np.sin(lean) * lateral
         result += [a + r_a * normal, b + (r_b if opened else -r_b) * normal, GAP[0]]
     return np.array(result[:-1])

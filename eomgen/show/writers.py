@@ -52,8 +52,8 @@ def indices_in(palette: Image, image: Image) -> Image:
     Pillow's own search looks at six bits of a colour, which turns white into light grey.
     """
     packed, where = np.unique(_packed(image), return_inverse=True)
-    own, known = _unpacked(packed).astype(float), palette.astype(float)
-    distances = (own**2).sum(axis=1)[:, None] - 2 * own @ known.T + (known**2).sum(axis=1)
+    colours, known = _unpacked(packed).astype(float), palette.astype(float)
+    distances = (colours**2).sum(axis=1)[:, None] - 2 * colours @ known.T + (known**2).sum(axis=1)
     nearest: Image = distances.argmin(axis=1).astype(np.uint8)[where].reshape(image.shape[:2])
     return nearest
 

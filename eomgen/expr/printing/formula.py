@@ -396,12 +396,12 @@ def _as_decimal(number: Any) -> str:
     """The decimal of a fraction that no hand would write, such as 981/100; empty of fractions such as 3/4 or 7/20."""
     if number.q % 25 or 10**DIGITS % number.q:
         return ""
-    shown = f"{Decimal(int(number.p)) / Decimal(int(number.q)):f}"
-    return shown if len(shown) <= DIGITS else ""
+    text = f"{Decimal(int(number.p)) / Decimal(int(number.q)):f}"
+    return text if len(text) <= DIGITS else ""
 
 
 def number(value: float, digits: int = 6) -> Formula:
     """A number of at most so many digits; one below 0 is a sum that subtracts it."""
-    shown, _, power = f"{abs(value):.{digits}g}".partition("e")
-    part = Number(shown, str(int(power)) if power else "")
+    text, _, power = f"{abs(value):.{digits}g}".partition("e")
+    part = Number(text, str(int(power)) if power else "")
     return Sum(((True, part),)) if value < 0 else part

@@ -76,8 +76,8 @@ class FormulaWriter:
 
     def factor(self, formula: tree.Formula) -> str:
         """A formula in a place where a sum needs parentheses."""
-        shown = self.write(formula)
-        return self.grouped(shown) if tree.is_group(formula) else shown
+        text = self.write(formula)
+        return self.grouped(text) if tree.is_group(formula) else text
 
 
 # -- LaTeX -------------------------------------------------------------------------------------------------------------
@@ -120,8 +120,8 @@ class _LatexWriter(FormulaWriter):
 
     def product(self, formula: tree.Product) -> str:
         result = ""
-        for shown in map(self.factor, formula.factors):
-            result += (r" \cdot " if result and shown[0].isdigit() else " " if result else "") + shown
+        for text in map(self.factor, formula.factors):
+            result += (r" \cdot " if result and text[0].isdigit() else " " if result else "") + text
         return result
 
     def quotient(self, formula: tree.Quotient) -> str:
@@ -132,11 +132,11 @@ class _LatexWriter(FormulaWriter):
         raised = f"^{{{exponent}}}" if len(exponent) > 1 else f"^{exponent}"
         if isinstance(base, tree.Call) and base.function in _LATEX:
             return self.call(base, raised)
-        shown = self.write(base)
+        text = self.write(base)
         of_abs = isinstance(base, tree.Call) and base.function == "abs"
-        if not of_abs and (not tree.is_simple(base) or "^" in shown or "'" in shown):
-            shown = fenced(shown)
-        return f"{shown}{raised}"
+        if not of_abs and (not tree.is_simple(base) or "^" in text or "'" in text):
+            text = fenced(text)
+        return f"{text}{raised}"
 
     def call(self, formula: tree.Call, power: str = "") -> str:
         inside = ", ".join(map(self.write, formula.arguments))
@@ -214,12 +214,12 @@ class _TextWriter(FormulaWriter):
         of_call = isinstance(base, tree.Call)
         if high and isinstance(base, tree.Call) and base.function not in ("abs", "sqrt"):
             return f"{base.function}{high}({self._inside(base)})"
-        shown = self.write(base)
-        plain = isinstance(base, tree.Name | tree.Words) or (of_call and shown.startswith("|"))
-        shown = shown if plain and not any(c in shown for c in "^*") else f"({shown})"
+        text = self.write(base)
+        plain = isinstance(base, tree.Name | tree.Words) or (of_call and text.startswith("|"))
+        text = text if plain and not any(c in text for c in "^*") else f"({text})"
         if high:
-            return shown + high
-        return f"{shown}^{exponent}" if exponent.isalnum() else f"{shown}^({exponent})"
+            return text + high
+        return f"{text}^{exponent}" if exponent.isalnum() else f"{text}^({exponent})"
 
     def call(self, formula: tree.Call) -> str:
         inside, function = self._inside(formula), formula.function
@@ -302,9 +302,9 @@ class _MathMLWriter(FormulaWriter):
     def product(self, formula: tree.Product) -> str:
         """Factors side by side; a point before one that begins with a digit."""
         result: list[str] = []
-        for shown in map(self.factor, formula.factors):
-            begins = shown.removeprefix("<mrow>").removeprefix("<msup>").startswith("<mn>")
-            result += [("<mo>·</mo>" if begins else _THIN) if result else "", shown]
+        for text in map(self.factor, formula.factors):
+            begins = text.removeprefix("<mrow>").removeprefix("<msup>").startswith("<mn>")
+            result += [("<mo>·</mo>" if begins else _THIN) if result else "", text]
         return row(*result)
 
     def quotient(self, formula: tree.Quotient) -> str:
@@ -314,14 +314,14 @@ class _MathMLWriter(FormulaWriter):
         exponent, base = self.write(formula.exponent), formula.base
         if isinstance(base, tree.Call) and base.function not in ("sqrt", "abs"):
             return self.call(base, exponent)
-        shown = self.write(base)
+        text = self.write(base)
         if not tree.is_simple(base):
-            shown = mathml_fenced(shown)
-        if shown.startswith("<msub>"):  # one element: the exponent stands above the subscript
-            return f"<msubsup>{shown.removeprefix('<msub>').removesuffix('</msub>')}{exponent}</msubsup>"
-        if shown.startswith(("<msup>", "<msubsup>")):
-            shown = mathml_fenced(shown)
-        return f"<msup>{shown}{exponent}</msup>"
+            text = mathml_fenced(text)
+        if text.startswith("<msub>"):  # one element: the exponent stands above the subscript
+            return f"<msubsup>{text.removeprefix('<msub>').removesuffix('</msub>')}{exponent}</msubsup>"
+        if text.startswith(("<msup>", "<msubsup>")):
+            text = mathml_fenced(text)
+        return f"<msup>{text}{exponent}</msup>"
 
     def call(self, formula: tree.Call, power: str = "") -> str:
         arguments = "<mo>,</mo>".join(map(self.write, formula.arguments))
@@ -342,8 +342,8 @@ class _MathMLWriter(FormulaWriter):
     def cases(self, formula: tree.Cases) -> str:
         rows = []
         for value, when in formula.branches:
-            held = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if&#160;</mtext>", self.write(when))
-            rows.append([self.write(value), held])
+            condition = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if&#160;</mtext>", self.write(when))
+            rows.append([self.write(value), condition])
         return row("<mo>{</mo>", table(rows, "text-align:left"))
 
     def matrix(self, formula: tree.Matrix) -> str:
@@ -403,10 +403,10 @@ def width(formula: tree.Formula, names: Notation) -> float:
             return FENCES + sum(max(map(of, column)) + COLUMN for column in zip(*formula.rows, strict=True))
 
 
-def _of_text(shown: str) -> float:
+def _of_text(text: str) -> float:
     """Letters of a name, without what stands above them."""
     total = 0.0
-    for c in shown:
+    for c in text:
         small = c in _HIGH or unicodedata.decomposition(c).startswith("<sub>")
         total += 0.0 if c == "'" or unicodedata.combining(c) else INDEX if small else 1.0
     return total
@@ -447,9 +447,9 @@ def mathml_lines(formula: tree.Formula, names: Notation) -> list[str]:
     result = [mathml(first, names)]
     for line in others:
         subtracted = isinstance(line, tree.Sum) and line.terms[0][0]
-        shown = mathml(line, names)
+        text = mathml(line, names)
         sign = MINUS_SIGN if subtracted else "+"
-        result.append(f"<mo form='infix'>{sign}</mo>{shown.replace(MINUS, '', 1) if subtracted else shown}")
+        result.append(f"<mo form='infix'>{sign}</mo>{text.replace(MINUS, '', 1) if subtracted else text}")
     return result
 
 

@@ -104,8 +104,8 @@ class Atoms:
         return frozenset().union(*(self.names_in(a) for monomial in poly for a, _ in monomial))
 
     def _names_in(self, atom: int) -> frozenset[int]:
-        own = frozenset({atom} if self.table[atom].kind == "name" else ())
-        return own.union(*map(self.names_in, self.inside(atom)))
+        name = frozenset({atom} if self.table[atom].kind == "name" else ())
+        return name.union(*map(self.names_in, self.inside(atom)))
 
     def _choices_in(self, atom: int) -> int:
         return max(map(self.choices_in, self.inside(atom)), default=0) + (self.table[atom].kind == CHOICE)
@@ -302,8 +302,8 @@ class Costs:
 
     def _roles_in(self, atom: int) -> frozenset[str]:
         kind, what = self.atoms.table[atom]
-        own = {"rate"} if kind in ("sym", "name") and what in self.rates else {"turn"} if kind in TURNS else set()
-        return frozenset(own).union(*map(self._roles, self.atoms.inside(atom)))
+        role = {"rate"} if kind in ("sym", "name") and what in self.rates else {"turn"} if kind in TURNS else set()
+        return frozenset(role).union(*map(self._roles, self.atoms.inside(atom)))
 
     def of_power(self, atom: int, n: Fraction | int) -> float:
         """A power of an atom, without the sign that joins it to its neighbours."""

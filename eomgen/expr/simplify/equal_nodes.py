@@ -44,19 +44,19 @@ def joined_nodes(
     roots, graph = with_known_conditions(roots), roots[0].graph
     opened = Opened(graph, [x.id for x in roots])
     order = reachable(graph, [*opened.roots, *opened.operands])
-    own = [name for name, _ in named]
-    names = sorted(graph.nodes[i][1] for i in order if graph.nodes[i][0] == "sym" and graph.nodes[i][1] not in own)
+    left = [name for name, _ in named]
+    names = sorted(graph.nodes[i][1] for i in order if graph.nodes[i][0] == "sym" and graph.nodes[i][1] not in left)
     result: dict[int, int] = {}
     if names and len(order) * (POINTS + MOVED * len(names)) <= MOST:
-        meant = list(zip(own, (Expr(graph, i) for i in opened.roots), strict=False))
-        joined = _Joined(Values(graph, order, names, meant, unit), own)
+        meant = list(zip(left, (Expr(graph, i) for i in opened.roots), strict=False))
+        joined = _Joined(Values(graph, order, names, meant, unit), left)
         result = joined.nodes()
         long = sum(joined.size[result[i]] for i in opened.roots) > LONG
         if long and len(reachable(graph, [result[i] for i in opened.roots])) > len(reachable(graph, opened.roots)):
             result = {}  # parts written anew share less with the others
     ids = opened.closed(result)
     made = _copied(graph, ids)
-    return made[len(own) :], list(zip(own, made, strict=False))
+    return made[len(left) :], list(zip(left, made, strict=False))
 
 
 def with_known_conditions(exprs: Sequence[Expr]) -> list[Expr]:
@@ -99,7 +99,7 @@ class Opened:
         """The roots with what was found for their nodes, and with the operations in the place of the symbols."""
         graph, final = self.graph, dict[int, int]()
 
-        def put_in(i: int) -> int:
+        def copy(i: int) -> int:
             for k in reachable(graph, [i], stop=final):
                 parts = operands(graph.nodes[k])
                 if k not in final and parts:
@@ -107,8 +107,8 @@ class Opened:
             return final.get(i, i)
 
         for symbol, (operation, parts) in self._stands_for.items():
-            final[symbol] = graph.make(operation, *(put_in(result.get(k, k)) for k in parts))
-        return [put_in(result.get(i, i)) for i in self.roots]
+            final[symbol] = graph.make(operation, *(copy(result.get(k, k)) for k in parts))
+        return [copy(result.get(i, i)) for i in self.roots]
 
 
 def _copied(graph: Graph, roots: Sequence[int]) -> list[Expr]:
@@ -162,12 +162,12 @@ class Values:
 class _Joined:
     """Finds a new node for each."""
 
-    def __init__(self, values: Values, own: Sequence[str]) -> None:
+    def __init__(self, values: Values, names: Sequence[str]) -> None:
         self.values, self.graph, self.order = values, values.graph, values.order
         self.size: dict[int, float] = {}
         self.symbols: dict[int, int] = {}
         self.rank: dict[int, int] = {}
-        self.of_name = {name: k for k, name in enumerate(own, 1)}
+        self.of_name = {name: k for k, name in enumerate(names, 1)}
         self.place = {name: 1 << k for k, name in enumerate(values.names)}
         self.left = WORK
         for i in self.order:

@@ -225,13 +225,13 @@ def _over(
     poly: Poly, atom: int, divisor: Poly, is_below: Callable[[Fraction | int], bool]
 ) -> dict[tuple[Monomial, Fraction | int], Poly]:
     """What stands over powers of an atom, by what is beside it but for symbols of the divisor, and by the power."""
-    own = {a for m in divisor for a, _ in m}
+    of_divisor = {a for m in divisor for a, _ in m}
     groups: dict[tuple[Monomial, Fraction | int], Poly] = {}
     for m, x in poly.items():
         power = dict(m).get(atom, 0)
         if is_below(power):
-            outer = tuple(f for f in m if f[0] not in own and f[0] != atom)
-            groups.setdefault((outer, power), {})[tuple(f for f in m if f[0] in own)] = x
+            outer = tuple(f for f in m if f[0] not in of_divisor and f[0] != atom)
+            groups.setdefault((outer, power), {})[tuple(f for f in m if f[0] in of_divisor)] = x
     return groups
 
 

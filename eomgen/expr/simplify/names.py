@@ -42,7 +42,7 @@ def inlined(
     """Without names that are not worth it; the atoms in ``fixed`` keep theirs unless they read as well without."""
     costs = factoring.costs.of_terms
     every = [*named, *((-1, poly) for poly in polys)]
-    held = [expansion.atoms.names(poly) for _, poly in every]
+    names_in = [expansion.atoms.names(poly) for _, poly in every]
     kept: list[int] = []
     same: dict[Frozen, Poly] = {}
 
@@ -50,14 +50,14 @@ def inlined(
         kept.append(k)
         same[freeze(value)] = {((every[k][0], 1),): 1}
 
-    def put_in(n: int, poly: Poly) -> None:
+    def replace(n: int, poly: Poly) -> None:
         every[n] = (every[n][0], poly)
-        held[n] = expansion.atoms.names(poly)
+        names_in[n] = expansion.atoms.names(poly)
 
     for k in range(len(named)):
         atom, value = every[k]
         value = same.get(freeze(value), value)  # of two of one value the second is the first
-        users = [n for n in range(k + 1, len(every)) if atom in held[n]]
+        users = [n for n in range(k + 1, len(every)) if atom in names_in[n]]
         if len(value) == 1 and len(users) > 1 and atom not in fixed:
             # named without its symbols and numbers, which may cancel
             inner, outer = _parted(expansion, value)
@@ -65,9 +65,9 @@ def inlined(
             put = [_put_in(expansion, factoring, every[n][1], atom, moved) for n in users]
             if inner != value and all(p is not None for p in put):
                 for n, p in zip(users, put, strict=True):
-                    put_in(n, p or {})
+                    replace(n, p or {})
                 value = same.get(freeze(inner), inner)
-                put_in(k, inner)
+                replace(k, inner)
         tried = None
         if is_plain(value, expansion.atoms) or (atom not in fixed and (len(value) == 1 or len(users) == 1)):
             tried = [_put_in(expansion, factoring, every[n][1], atom, value) for n in users]
@@ -79,7 +79,7 @@ def inlined(
             keep(k, value)
             continue
         for n, p in zip(users, tried, strict=True):
-            put_in(n, p or {})
+            replace(n, p or {})
     return [every[k] for k in kept], [p for a, p in every if a < 0]
 
 

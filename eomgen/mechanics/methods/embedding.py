@@ -45,14 +45,14 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     graph, a = kinematics.graph, kinematics.a
     rates, applied = joint_rates(kinematics), applied_wrenches(kinematics)
     rest = tuple(graph.zero for _ in kinematics.v)
-    own = Resolved.in_link_axes(kinematics.links, kinematics.twists, rates, applied)
+    links = Resolved.in_link_axes(kinematics.links, kinematics.twists, rates, applied)
     spatial = [link.spatial for link in kinematics.links]
     inertias = regroup(graph, kinematics.links)
-    inverse = _sweep(kinematics, own, inertias, a)
-    plain = _sweep(kinematics, own, spatial, a)
+    inverse = _sweep(kinematics, links, inertias, a)
+    plain = _sweep(kinematics, links, spatial, a)
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
         inertias, inverse = spatial, plain
-    chosen, mass, bias = own, composite_mass_matrix(own.links, inertias), _sweep(kinematics, own, inertias, rest)
+    chosen, mass, bias = links, composite_mass_matrix(links.links, inertias), _sweep(kinematics, links, inertias, rest)
     common = resolve_parallel(graph, kinematics.links, kinematics.v, rates, applied)
     if any(axes is not None for axes in common.axes):
         turned_inertias = common.inertias(inertias)
@@ -60,8 +60,8 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         if _cost(*other) < _cost(mass, bias):
             chosen, inertias, (mass, bias) = common, turned_inertias, other
             inverse = _sweep(kinematics, chosen, inertias, a)
-    own_axes, blocks = turn_links(kinematics.links, kinematics.mechanism.gravity)
-    resolved = chosen.with_columns(own_axes)
+    axes, blocks = turn_links(kinematics.links, kinematics.mechanism.gravity)
+    resolved = chosen.with_columns(axes)
     turned = partial(_turned_system, kinematics, resolved, inertias, rest, blocks)
     return TreeEquations(
         method="embedding",
@@ -110,10 +110,10 @@ def _moment(inertia: Mat3, omega: Vec3, alpha: Vec3, turning: Mat3) -> Vec3:
     squares = [w * w for w in omega]
     result = []
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        own = inertia[i][i] * alpha[i] + (inertia[k][k] - inertia[j][j]) * (omega[j] * omega[k])
+        principal = inertia[i][i] * alpha[i] + (inertia[k][k] - inertia[j][j]) * (omega[j] * omega[k])
         # alpha_j - omega_i omega_k = -U_ki, alpha_k + omega_i omega_j = U_ji
         mixed = inertia[i][k] * turning[j][i] - inertia[i][j] * turning[k][i]
-        result.append(own + mixed + inertia[j][k] * (squares[j] - squares[k]))
+        result.append(principal + mixed + inertia[j][k] * (squares[j] - squares[k]))
     return result[0], result[1], result[2]
 
 
@@ -220,8 +220,8 @@ class Composite(NamedTuple):
 
     def whirled(self, s: Vec3, l: Vec3) -> Vec3:
         """Twice the sum of m v x (s x r + l)."""
-        across = vec.sub(vec.scale(self._trace, s), vec.transpose_times(self.V, s))
-        return vec.add(across, vec.cross(self.P, l))
+        moment = vec.sub(vec.scale(self._trace, s), vec.transpose_times(self.V, s))
+        return vec.add(moment, vec.cross(self.P, l))
 
     @property
     def _trace(self) -> Expr:
@@ -297,13 +297,13 @@ class ForceSlopes:
             above, still = self._above(k), vec.zero(kinematics.graph)
             return MotionField(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
         x = jvp([*s, *l], kinematics.q_dot_direction)
-        own, moved = (x[0], x[1], x[2]), (x[3], x[4], x[5])
+        linear, moved = (x[0], x[1], x[2]), (x[3], x[4], x[5])
         two = kinematics.graph.constant(2.0)
         return MotionField(
             s,
             l,
-            vec.add(vec.cross(self._omegas[k], s), own),
-            vec.add(vec.cross(self._twice[k], s), vec.scale(two, own)),
+            vec.add(vec.cross(self._omegas[k], s), linear),
+            vec.add(vec.cross(self._twice[k], s), vec.scale(two, linear)),
             vec.add(vec.cross(self._twice[k], l), vec.scale(two, moved)),
         )
 
@@ -395,9 +395,9 @@ class ForceSlopes:
                 first = jvp([*s, *l], kinematics.q_dot_direction)
                 second = jvp(first, along)
                 rates = [vec.cross(self._omegas[k], vec.three(first, at)) for at in (0, 3)]
-                own = [vec.add(vec.three(second, 3 * m), vec.scale(two, rates[m])) for m in (0, 1)]
+                second_rates = [vec.add(vec.three(second, 3 * m), vec.scale(two, rates[m])) for m in (0, 1)]
                 hat = vec.sub(vec.times(turning, l), vec.cross(s, linear))
-                result[k].append((vec.add(vec.times(turning, s), own[0]), vec.add(hat, own[1])))
+                result[k].append((vec.add(vec.times(turning, s), second_rates[0]), vec.add(hat, second_rates[1])))
         return result
 
     def by_position(self, a: Sequence[Expr]) -> Entries:
@@ -415,7 +415,7 @@ class ForceSlopes:
                 force = vec.add(force, vec.add(vec.cross(field.s_rate, body.P), vec.cross(field.s, push)))
                 wrench = vec.add(moment, vec.cross(field.l, push)), force
                 for at, columns in self._inwards(k, c):
-                    own = self._lifted[i, at]
+                    lifted = self._lifted[i, at]
                     for d, other in enumerate(self._fields[at][:columns]):
                         j = links[at].first + d
                         if j == i or at != k or self._places[j] >= 0:
@@ -423,7 +423,7 @@ class ForceSlopes:
                         else:  # columns of one slot turn with each other
                             slopes[j, i] = self._inner(swept[k][c], field, self._lifted[j, k])
                         if j != i:
-                            slopes[i, j] = self._inner(swept[at][d], other, own)
+                            slopes[i, j] = self._inner(swept[at][d], other, lifted)
                     if links[at].parent != GROUND:
                         wrench = links[at].lift(wrench)
             if (p := links[k].parent) != GROUND:

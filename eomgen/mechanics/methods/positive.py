@@ -41,9 +41,9 @@ class MasslessMotion:
         involved = [j for j in np.argsort(-np.abs(v), kind="stable") if abs(v[j]) > FAINT]
         largest = names[involved[0]]
         path = _place_of_velocity(mechanism, largest)
-        shown = sorted(involved)
-        ratio = " : ".join(f"{v[j]:.3g}" for j in shown)
-        together = f"{', '.join(names[j] for j in shown)} at the rates {ratio}"
+        places = sorted(involved)
+        ratio = " : ".join(f"{v[j]:.3g}" for j in places)
+        together = f"{', '.join(names[j] for j in places)} at the rates {ratio}"
         turning = self._turning(kinematics)
         if not turning:
             message = f"the motion of {together} has {self.what} behind it"
@@ -124,8 +124,8 @@ def _massless(kinematics: Kinematics) -> str:
     ]
     if not names:
         return ""
-    shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
-    return f"; bodies without mass and inertia: {shown}"
+    listed = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+    return f"; bodies without mass and inertia: {listed}"
 
 
 def find_massless(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> list[Problem]:

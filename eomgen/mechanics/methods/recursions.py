@@ -220,7 +220,7 @@ class ArticulatedBodies:
         self.row_wrenches: list[dict[int, Wrench]] = [{} for _ in links]
         self.rests = [row.rest for row in rows]
         self.coupling: list[dict[int, Expr]] = [{} for _ in rows]  #: G without its diagonal
-        self.own = [graph.zero for _ in rows]  #: the diagonal of G
+        self.diagonal = [graph.zero for _ in rows]  #: the diagonal of G
         self.sizes = [graph.zero for _ in rows]
         self.releases: list[list[Release]] = [[] for _ in links]
         self.inner: list[list[Multiplier]] = [[] for _ in links]  #: taken out before the link's joint is released
@@ -331,7 +331,7 @@ class ArticulatedBodies:
                 if not drive:
                     row_wrenches[i] = _with_released(row_wrenches[i], column, self.rows[i].entries.get(index))
                 self.rests[i] = self.rests[i] + push * rate
-                self.own[i] = self.own[i] + push * share
+                self.diagonal[i] = self.diagonal[i] + push * share
                 self.sizes[i] = self.sizes[i] + push * share
                 for j, other in pushes.items():
                     if j < i:
@@ -350,7 +350,7 @@ class ArticulatedBodies:
         while left:
             i = min(left, key=lambda row: (len(self.coupling[row]), row))
             left.remove(i)
-            pivot = self.own[i] + relaxed
+            pivot = self.diagonal[i] + relaxed
             reciprocal = 1.0 / pivot
             wrench, others, rest = row_wrenches.pop(i, (still, still)), self.coupling[i], self.rests[i]
             result.append(Multiplier(i, wrench, rest, reciprocal, others))
@@ -361,7 +361,7 @@ class ArticulatedBodies:
             for j, entry in others.items():
                 share = entry * reciprocal
                 del self.coupling[j][i]
-                self.own[j] = self.own[j] - share * entry
+                self.diagonal[j] = self.diagonal[j] - share * entry
                 self.rests[j] = self.rests[j] - share * rest
                 if k is not None:
                     row_wrenches[j] = add(row_wrenches.get(j, (still, still)), scaled(-share, wrench))
@@ -374,14 +374,14 @@ class ArticulatedBodies:
         """What is added to the diagonal of G."""
         if not rows or not self.term:
             return self.graph.zero
-        largest = self.own[rows[0]]
+        largest = self.diagonal[rows[0]]
         for i in rows[1:]:
-            largest = self.graph.apply("max", largest, self.own[i])
+            largest = self.graph.apply("max", largest, self.diagonal[i])
         return largest * self.term
 
     # -- outwards -------------------------------------------------------------------------------------------------
-    def _find_multipliers(self, held: Sequence[Multiplier], motion: Twist | None) -> None:
-        for one in reversed(held):
+    def _find_multipliers(self, multipliers: Sequence[Multiplier], motion: Twist | None) -> None:
+        for one in reversed(multipliers):
             value = one.rest if motion is None else one.rest + dot(one.wrench, motion)
             for j, entry in one.others.items():
                 value = value - entry * self.multipliers[j]
