@@ -9,7 +9,6 @@ from functools import reduce
 from ..elements.forces.force import View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .limits import ASIDE, BACK, COMMON, EQUAL, FOCAL, NEAREST, NOWHERE, PLAIN, POLISHED, TWICE, UNIQUE
 from .point import Contact, Touch
@@ -23,7 +22,6 @@ from .rounds import along_axis, direction, seen_from, settled
 _TOO_BENT = 0.002
 
 
-@dataclass(frozen=True)
 class EllipsoidPlane(Contact):
     """An ellipsoid about the second marker, half axes along its x, y, z, on the plane through the first.
 
@@ -121,7 +119,6 @@ def unless_spheres(axes: Sequence[Sequence[Expr]], depth: Expr) -> Expr:
     return where(reduce(lambda a, b: graph.apply("and", a, b), equal), NOWHERE, depth)
 
 
-@dataclass(frozen=True)
 class EllipsoidRound(Contact):
     """A sphere about the second marker on an ellipsoid about the first, half axes along its x, y, z."""
 
@@ -174,7 +171,6 @@ def silhouette_normal(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, 
     return nx, ny, sqrt(nx * (bxx * nx + bxy * ny) + ny * (bxy * nx + byy * ny))
 
 
-@dataclass(frozen=True)
 class EllipsoidRod(EllipsoidRound):
     """A rod along x of the second marker, of a radius, on an ellipsoid about the first.
 
@@ -238,7 +234,6 @@ def _outer(weight: Expr, a: Vec3) -> Mat3:
     return x, y, z
 
 
-@dataclass(frozen=True)
 class EllipsoidEllipsoid(Contact):
     """Two ellipsoids about the markers, half axes along their x, y, z: contact along their common normal n.
 
@@ -335,7 +330,6 @@ class EllipsoidEllipsoid(Contact):
 # -- cuboids -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class BlockEllipsoid(Contact):
     """An ellipsoid about the second marker on a cuboid about the first, half lengths and half axes along x, y, z.
 

@@ -18,7 +18,6 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, reachable, sqrt, substitute
 from ..expr.differentiate import gradient
 from ..expr.functions import Surface
-from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import quadratic_form
 from .limits import ASTRAY, FOOT, NOWHERE, STEEP
@@ -95,7 +94,6 @@ def field_lines(height: Expr) -> list[list[Vec3]]:
     return [*grid, *(list(line) for line in zip(*grid, strict=True))]
 
 
-@dataclass(frozen=True)
 class FieldContact(Contact):
     """A shape about the second marker on a height field of the first."""
 
@@ -190,7 +188,6 @@ class FieldContact(Contact):
         return (x, y, z), -where(graph.apply("lt", 0.0, gap), UP_TO / BEYOND * gap, gap)
 
 
-@dataclass(frozen=True)
 class FieldRound(FieldContact):
     """A sphere, or a point of radius 0: the nearest point of the ground."""
 
@@ -205,7 +202,6 @@ class FieldRound(FieldContact):
         return vec.scale(-self.radius, vec.sub(vec.scale(1.0 / w, change), vec.scale(along, m)))
 
 
-@dataclass(frozen=True)
 class FieldEllipsoid(FieldContact):
     """An ellipsoid, half axes along its x, y, z; its farthest point against m is -B m / sqrt(m B m) from its centre.
 

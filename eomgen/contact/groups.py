@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ..base.value_rules import POSITIVE, Allowed
 from ..elements.dimensions import LENGTH
-from ..elements.element_type import ElementType, Entry, law, table
+from ..elements.element_type import ElementType, Entry, element, table
 from ..elements.forces.force import Force, Load, MarkerLoad, MovingView, View
 from ..elements.forces.friction import (
     BRISTLES,
@@ -26,7 +26,6 @@ from ..elements.forces.normal_laws import CURVED_LAWS, IMPACT, HertzBodies, Norm
 from ..elements.frames import Frame, Marker
 from ..elements.looks import Seen
 from ..expr.core import Expr, Graph
-from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, MEETINGS, PairLaw, class_of, pair_kind, pair_states
 from .pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
@@ -56,7 +55,6 @@ from .states import (
 # model's graph (:mod:`~eomgen.contact.pairs`), so that equations do not grow with the number of pairs.
 
 
-@dataclass(frozen=True)
 class ContactGroups(Force):
     """Contact of two groups of shapes, or of the shapes of one group among themselves (``second`` is empty then).
 
@@ -434,7 +432,7 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, E
             keys = [f"{part}.{key}" for key in e.values[part]] if isinstance(e.values[part], Mapping) else [part]
             for key in keys:
                 e.fault(key, "is of another law than soil", "leave it out")
-        result = e.read_part("soil")
+        result = e["soil"]
         return None if result is None else (*result, (None, None))
     if "law" not in e.values:
         e.fault("", "has no law", "give law: {stiffness: ...} and what else the law has, or soil", "EG-MISSING")
@@ -444,7 +442,7 @@ def _laws(e: Entry) -> tuple[NormalLaw, DryFriction | None, tuple[Expr | None, E
     if law is not None and "restitution" in law.values and "restitution" in law.fields:  # judged once
         restitution = law["restitution"] if rigid else law.law("restitution", {})
     if not rigid:
-        friction = e.read_part("friction")
+        friction = e["friction"]
         return None if normal is None else (normal, friction, (getattr(friction, "dynamic", None), restitution))
     for key in [key for key in rubbing if key != "dynamic"]:
         why = "has no meaning for rigid bodies, whose friction is a coefficient"
@@ -574,11 +572,11 @@ _ALLOWED = (
 )
 
 #: No penetration, in runs by the method moreau only.
-RIGID = law(
+RIGID = element(
     RigidLaw,
     "rigid",
     "no penetration, for runs by the method moreau only.",
-    {
+    more={
         "restitution": IMPACT["restitution"].replace(
             doc="coefficient of restitution, Newton's", allowed=Allowed(0.0, 1.0), remedy="is 0 to 1"
         )

@@ -25,14 +25,12 @@ from ..elements.kinds import Fields, Pair, Radii, Scalar
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
 Touch = tuple[Vec3, Expr, Vec3, Vec3]
 
 
-@dataclass(frozen=True)
 class Contact(Force):
     """Contact at one point: a force along the normal and friction against the sliding velocity.
 
@@ -170,7 +168,6 @@ class Contact(Force):
         return [MarkerLoad(self.second, force, on_second), MarkerLoad(self.first, vec.neg(force), on_first)]
 
 
-@dataclass(frozen=True)
 class SpherePlane(Contact):
     """A sphere about the second marker on the plane through the first, whose z axis points out of the solid.
 
@@ -191,7 +188,6 @@ class SpherePlane(Contact):
         return normal, depth, vec.add(reach, second), second
 
 
-@dataclass(frozen=True)
 class SphereSphere(Contact):
     """Two spheres about the markers; undefined where their centres coincide."""
 
@@ -216,15 +212,15 @@ def joint_radius(first: Expr, second: Expr) -> Expr:
 
 
 def _on_plane(e: Entry) -> SpherePlane | None:
-    pair, law, friction = e.pair(), e.read_part("law"), e.read_part("friction")
-    radius = e.positive("radius") if "radius" in e.fields else e.graph.zero
+    pair, law, friction = e.pair(), e["law"], e["friction"]
+    radius = e["radius"] if "radius" in e.fields else e.graph.zero
     if pair is None or law is None:
         return None
     return SpherePlane(e.name, *pair, law.at(lambda: radius), friction, radius)
 
 
 def _two_spheres(e: Entry) -> SphereSphere | None:
-    pair, law, friction, radii = e.pair(), e.read_part("law"), e.read_part("friction"), e["radii"]
+    pair, law, friction, radii = e.pair(), e["law"], e["friction"], e["radii"]
     if pair is None or radii is None or law is None:
         return None
     for k, radius in enumerate(radii):
@@ -256,7 +252,7 @@ TYPES = table(
         "contact of a sphere (about the second marker) with a plane (x-y of the first marker, z out of the solid).",
         {
             "between": Pair(_ENDS.format("sphere's centre"), required=True),
-            "radius": Scalar("radius of the sphere (m)", required=True, dimension=LENGTH),
+            "radius": Scalar("radius of the sphere (m)", required=True, dimension=LENGTH, allowed=POSITIVE),
             **_CURVED,
         },
         _on_plane,

@@ -23,7 +23,6 @@ from ..elements.forces.force import View, where
 from ..elements.forces.normal_laws import NormalLaw, PartOfLaw
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import FLAT_CORNER, NOWHERE
 from .pair_features import FACING, OWN
@@ -106,7 +105,6 @@ class _Parts(NamedTuple):
     relieved: Expr  #: the part of the law of that depth
 
 
-@dataclass(frozen=True)
 class PolygonPolygon(Contact):
     """A convex polygon about the second marker on one about the first, in its x-y plane: one of two contact points.
 

@@ -15,7 +15,6 @@ from ..elements.forces.force import View, where
 from ..elements.frames import Frame
 from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
-from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import BELOW, EVEN, FLAT_CORNER, NOWHERE, ROOM, SHARED
 from .pair_features import PIECE
@@ -219,7 +218,6 @@ def part(side: Expr, width: Expr) -> Expr:
     return graph.apply("max", 0.0, graph.apply("min", 1.0, 0.5 + 0.5 * side / width))
 
 
-@dataclass(frozen=True)
 class ProfilePiece(Contact):
     """A circle about the second marker on a piece of a profile in the x-y plane of the first.
 
@@ -487,7 +485,6 @@ class HollowArcRound(ProfilePiece):
         return self._touching(view, (1.0 + where(apart, q, 0.0)) / k, normal, reach)
 
 
-@dataclass(frozen=True)
 class InsideRound(ProfilePiece):
     """A circle whose centre is deep inside an outline: pushed out to the nearest place of its nearest piece."""
 

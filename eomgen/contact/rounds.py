@@ -14,7 +14,6 @@ from ..elements.frames import Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.differentiate import gradient
-from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from .limits import PARALLEL
 from .pair_features import EDGE
@@ -55,7 +54,6 @@ def settled(view: View, x: Expr) -> Expr:
     return x if keep is None else keep(x)
 
 
-@dataclass(frozen=True)
 class RoundRound(SphereSphere):
     """Two circles or spheres; where their centres coincide the second is pushed along x of the first marker."""
 
@@ -67,7 +65,6 @@ class RoundRound(SphereSphere):
         return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
 
 
-@dataclass(frozen=True)
 class SegmentRound(Contact):
     """A circle or sphere about the second marker on a segment along x of the first, which has a radius of its own.
 
@@ -88,7 +85,6 @@ class SegmentRound(Contact):
         return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
 
 
-@dataclass(frozen=True)
 class PolygonRound(Contact):
     """A circle about the second marker on a convex polygon in the x-y plane of the first.
 
@@ -128,7 +124,6 @@ class PolygonRound(Contact):
         return normal, depth, vec.add(reach, second), second
 
 
-@dataclass(frozen=True)
 class AtHeight(Contact):
     """Shapes of the plane that touch in the plane of the first: the point of contact lies at the height of the second.
 
@@ -164,7 +159,6 @@ class AtHeight(Contact):
 # -- shapes in space ---------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class RodRod(Contact):
     """Two segments along x of the markers, each with a radius: contact where they are nearest.
 
@@ -291,7 +285,6 @@ def beside_ends(
     return where(deep, 1.0 - part * part, 1.0)
 
 
-@dataclass(frozen=True)
 class EdgeEdge(SharedEnergy, RodRod):
     """An edge of a cuboid on another: where they cross, not where one ends, as corners touch there.
 
@@ -311,7 +304,6 @@ class EdgeEdge(SharedEnergy, RodRod):
         return part
 
 
-@dataclass(frozen=True)
 class EdgeRod(EdgeEdge):
     """An edge of a cuboid on a rod, whose ends touch the cuboid by themselves."""
 
@@ -325,7 +317,6 @@ class EdgeRod(EdgeEdge):
         return self._share(view, 1) * beside
 
 
-@dataclass(frozen=True)
 class RodCorner(SharedEnergy, SegmentRound):
     """A corner of a cuboid on a rod, whose ends touch the cuboid by themselves."""
 
@@ -337,7 +328,6 @@ class RodCorner(SharedEnergy, SegmentRound):
         return beside_ends(view, (self.first, self.half), solid, self.touch(view)[1], radius)
 
 
-@dataclass(frozen=True)
 class BlockRound(Contact):
     """A sphere about the second marker on a cuboid about the first, half lengths along its x, y, z.
 

@@ -14,7 +14,6 @@ from ..elements.forces.force import Load, View, beyond_zero, where
 from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import BESIDE, BLADE, FOLLOWED, GRIP, SIDES, UNSHEARED, WEDGE
 from .point import Contact, Touch
@@ -55,7 +54,6 @@ class _Pressing(NamedTuple):
     quick: Expr
 
 
-@dataclass(frozen=True)
 class SoilCell(Contact):
     r"""A wheel or a plate on one cell of soil: a column of the length a along the ground, as wide as what presses it.
 

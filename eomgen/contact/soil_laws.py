@@ -16,7 +16,7 @@ from ..elements.forces.normal_laws import DISSIPATION, NormalLaw
 from ..elements.kinds import Fields, Flag, Radii, Scalar
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.vectors import Vec3
 from .limits import CAUGHT_UP
 from .states import WHEEL, cells_of, groups_of_entry
@@ -93,8 +93,7 @@ SETTLING = 1e-3  #: (s) of cells of a bed
 _NUMBERS = ("cohesive", "frictional", "exponent", "dissipation", "recovery", "rebound", "width", "reversal", "settling")
 
 
-@dataclass(frozen=True)
-class SoilPressure(NormalLaw):
+class SoilPressure(Record, NormalLaw):
     """Pressure p of a point of a plate at a sinkage z, whose greatest so far is z_m, times the area that it stands for.
 
         p = k z^n, k = k_c / b + k_phi                         at the greatest sinkage (Bekker)
@@ -200,7 +199,6 @@ class SoilPressure(NormalLaw):
         return (-self.deepest / self.recovery,)
 
 
-@dataclass(frozen=True)
 class SoilShear(DryFriction):
     """Shear stress against the sliding, tau = (c + p tan phi) s, |s| = 1 - exp(-j / K) of the shear displacement j.
 

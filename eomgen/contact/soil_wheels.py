@@ -10,7 +10,6 @@ from ..elements.forces.force import Load, MarkerLoad, View, beyond_zero, where
 from ..elements.frames import velocity_at
 from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
-from ..expr.records import dataclass
 from ..expr.vectors import Vec3
 from .limits import FOREMOST, SHORT_WAY
 from .point import Contact, Touch
@@ -41,7 +40,6 @@ class _Node(NamedTuple):
     ahead: bool
 
 
-@dataclass(frozen=True)
 class SoilWheel(Contact):
     """A rigid wheel in soil, rolling steadily: pressure and shear on the arc of its rim that is in the ground.
 

@@ -7,13 +7,28 @@ of their class, which :func:`key` marks.
 
 from __future__ import annotations
 
+import re
+from abc import ABC
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ..base.value_rules import Allowed
 from ..expr.core import Expr, Graph
+from ..expr.records import Record
 from .frames import Marker
 from .kinds import Choice, Field, Fields, Schema, table_schema
+
+
+class Element(Record, ABC):
+    """What has a type; ``type_name`` is that of the class unless it says another."""
+
+    if TYPE_CHECKING:
+        type_name: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "type_name" not in vars(cls):
+            cls.type_name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
 
 
 class Found(NamedTuple):
@@ -96,8 +111,11 @@ class Entry:
         return self.read(key)
 
     def read(self, key: str, *own: Any, kind: type[Field] | None = None) -> Any:
-        """The same; read as if the key was of another kind, or with coordinates of the entry's own."""
+        """The same, a law by its type; read as if of another kind, or with coordinates of the entry's own."""
         field = self.fields[key]
+        if isinstance(field, Law):
+            law = self.part(key)
+            return None if law is None else law.element_type.read(law)
         if key not in self.values and field.default is None:
             return field.absent(self.reader)
         value = self.values.get(key, field.default)
@@ -155,23 +173,10 @@ class Entry:
                 law.missing(key, f"give the {(self.fields[names.get(key, key)] if names else one).doc}")
         return law
 
-    def read_part(self, key: str) -> Any:
-        """The law under a key; None where there is none, or a fault, which is noted."""
-        law = self.part(key)
-        return None if law is None else law.element_type.read(law)
-
     def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
         """Two markers."""
         result: tuple[Marker, Marker] | None = self[key]
         return result
-
-    def positive(self, key: str) -> Expr:
-        """An expression that must be greater than 0."""
-        value: Expr | None = self[key]
-        if value is None:
-            return self.stand_in  # missing, which is noted by who asks
-        self.reader.requirements.positive(self._at(key), value)
-        return value
 
     # -- coordinates and names ------------------------------------------------------------------------------------
     def symbol(self, quantity: Found) -> Expr:
@@ -267,6 +272,9 @@ class Where(NamedTuple):
     one_of: tuple[str, ...] = ()
 
 
+NOWHERE = Where({}, lambda e: ())
+
+
 def key(field: Field) -> Any:
     """A field of an element's class that is a key of its entries."""
     return field
@@ -282,30 +290,34 @@ def element(
     kind: type,
     name: str,
     doc: str,
-    where: Where | None = None,
+    where: Where = NOWHERE,
     keys: Fields | None = None,
-    check: Callable[[Entry], None] | None = None,
-    **more: Any,
+    more: Mapping[str, Field] = {},
+    check: Callable[[Entry, dict[str, Any]], None] = lambda e, values: None,
+    **rest: Any,
 ) -> ElementType:
-    """The type of elements whose fields are read from their keys one by one, in this order.
+    """The type of elements or laws whose fields are read from their keys one by one, in this order.
 
-    The class says what it acts on (with ``where``) and its keys, unless ``keys`` has others for the same fields;
-    ``check`` notes what is wrong with the entry beside its keys, ``more`` is what else an ElementType has.
+    The class says its keys, unless ``keys`` has others for the same fields; ``where`` is what it acts on, ``more`` are
+    keys beside these.  ``check`` notes what is wrong with several values together, and puts in place of fields what
+    follows from others; ``rest`` is what else an ElementType has.
     """
-    own = keys_of(kind) if keys is None else keys
+    fields = keys_of(kind)
+    own = fields if keys is None else keys
 
     def read(e: Entry) -> Any:
-        if check is not None:
-            check(e)
-        place = () if where is None else where.read(e)
-        values = [e[one] for one in own]
-        needed = (x.required or x.default is not None for x in own.values())
-        if place is None or any(value is None and need for value, need in zip(values, needed, strict=True)):
+        place = where.read(e)
+        values = {field: e[one] for field, one in zip(fields, own, strict=True)}
+        check(e, values)
+        needed = [field for field, x in zip(fields, own.values(), strict=True) if x.required or x.default is not None]
+        if place is None or e.at_fault() or any(values[field] is None for field in needed):
             return None
-        return kind(e.name, *(place if isinstance(place, tuple) else (place,)), *values)
+        beside = place if isinstance(place, tuple) else (place,)
+        values = {field: e.symbol(x) if isinstance(x, Found) else x for field, x in values.items()}
+        return kind(*[e.name] * (e.owner is e), *beside, **values)
 
-    more = {"read": read, **({} if where is None else {"one_of": where.one_of}), **more}
-    return ElementType(name, doc, own if where is None else {**where.keys, **own, **where.behind}, **more)
+    every = {**where.keys, **own, **where.behind, **more}
+    return ElementType(name, doc, every, read, **{"one_of": where.one_of, **rest})
 
 
 # -- laws --------------------------------------------------------------------------------------------------------------
@@ -360,29 +372,6 @@ class Law(Field):
             return value
         keys = self.keys_of(self.type_of(value))
         return {key: keys[key].map(x, visitor) if key in keys else x for key, x in value.items()}
-
-
-def law(
-    kind: type,
-    name: str,
-    doc: str,
-    more: Fields | None = None,
-    check: Callable[[Entry, dict[str, Any]], None] | None = None,
-    remedies: Mapping[str, str] = {},
-) -> ElementType:
-    """The type of laws whose fields are read from their keys; ``more`` are keys beside these.
-
-    ``check`` notes what is wrong with several together, and puts in place of fields what follows from others.
-    """
-    fields = keys_of(kind)
-
-    def read(e: Entry) -> Any:
-        values = {key: e[key] for key in fields}
-        if check is not None:
-            check(e, values)
-        return None if e.at_fault() else kind(**values)
-
-    return ElementType(name, doc, fields | (more or {}), read, remedies=remedies)
 
 
 def sort_laws(

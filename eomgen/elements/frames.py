@@ -6,14 +6,13 @@ from typing import Protocol
 
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.vectors import Mat3, Vec3
 
 GROUND = -1
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(Record):
     """Placement in a body: ``rotation`` takes marker axes to body axes, ``position`` is in body axes (m)."""
 
     rotation: Mat3
@@ -34,8 +33,7 @@ class Frame:
         return cls(vec.identity(graph), vec.zero(graph))
 
 
-@dataclass(frozen=True)
-class Marker:
+class Marker(Record):
     """A frame fixed in a body (``body`` is an index, or GROUND); ``label`` is how messages call it."""
 
     body: int
@@ -67,8 +65,7 @@ def velocity_at(view: MotionView, marker: Marker, arm: Vec3) -> Vec3:
     return vec.add(view.velocity(marker), vec.cross(view.angular_velocity(marker), arm))
 
 
-@dataclass(frozen=True)
-class WrapCylinder:
+class WrapCylinder(Record):
     """A cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
 
     The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.  The surface

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
@@ -13,12 +13,11 @@ from ..base.value_rules import NOT_NEGATIVE
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_of
 from ..expr.differentiate import jvp
-from ..expr.records import dataclass
 from ..expr.vectors import Mat3, Vec3
 from . import kinds
 from .constraints.switching import SWITCHING
 from .dimensions import ENERGY, LENGTH, REACH, TIME
-from .element_type import ElementType, Types, key, keys_of, table
+from .element_type import Element, ElementType, Types, key, keys_of, table
 from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
 from .looks import JointLook, SymbolPart
 from .rotations import euler_parameters_from_matrix
@@ -110,13 +109,11 @@ DATA: Fields = {
 }
 
 
-@dataclass(frozen=True)
-class Joint(ABC):
+class Joint(Element):
     """Questions every joint type answers.
 
     Class attributes
     ----------------
-    type_name : the word in model files and the Model's method
     has_axis : whether ``axis=`` is accepted
     has_axes : whether ``axes=``, directions of x and y, is accepted instead
     options : further keys of this type: the fields that :func:`~eomgen.elements.element_type.key` marks
@@ -147,6 +144,7 @@ class Joint(ABC):
     look: ClassVar[JointLook] = JointLook()
 
     def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
         cls.options = keys_of(cls)
 
     @classmethod
@@ -288,7 +286,6 @@ def parameter_rates(e: Sequence[Expr], w: Sequence[Expr]) -> list[Expr]:
 # -- axes that stay parallel -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class AxisJoint(Joint):
     """S slides along the axes that are not held, and turns about z where all axes are not kept parallel.
 
@@ -315,40 +312,32 @@ class AxisJoint(Joint):
 # -- one degree of freedom ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Revolute(AxisJoint):
     """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     sentence = "S turns about the axis {z} that it shares with P; the origins coincide."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \mathbf{0}"
-    type_name = "revolute"
     look = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
     coordinates = (Coordinate("", "angle"),)
     fixed_axes = "xyz"
     parallel_axes = "z"
 
 
-@dataclass(frozen=True)
 class Continuous(Revolute):
     """A revolute joint without limits, as URDF calls it.  Allows 1, removes 5."""
 
-    type_name = "continuous"
 
-
-@dataclass(frozen=True)
 class Prismatic(AxisJoint):
     """S slides along the common z axis without turning.  Allows 1, removes 5."""
 
     sentence = "S slides along the axis {z} that it shares with P, without turning."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_{z}"
-    type_name = "prismatic"
     look = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
     coordinates = (Coordinate("", "length"),)
     fixed_axes = "xy"
     parallel_axes = "xyz"
 
 
-@dataclass(frozen=True)
 class Screw(AxisJoint):
     """S turns about the common z axis and slides along it by ``pitch`` (m) per turn.  Allows 1, removes 5.
 
@@ -357,7 +346,6 @@ class Screw(AxisJoint):
 
     sentence = "S turns about the common axis {z} and advances by the pitch $p$ in each turn."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \frac{p}{2\pi} q \mathbf{e}_{z}"
-    type_name = "screw"
     look = JointLook((SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True)
     counts_turns = True
     coordinates = (Coordinate("", "angle"),)
@@ -401,52 +389,44 @@ class Screw(AxisJoint):
 # -- several degrees of freedom ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Cylindrical(AxisJoint):
     """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
     sentence = "S slides along the common axis {z} and turns about it."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"
-    type_name = "cylindrical"
     look = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
     coordinates = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
     fixed_axes = "xy"
     parallel_axes = "z"
 
 
-@dataclass(frozen=True)
 class Planar(AxisJoint):
     """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
     sentence = "S slides along the axes {x} and {y} of P and turns about the axis {z}."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
-    type_name = "planar"
     look = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
     coordinates = (Coordinate("_x", "length"), Coordinate("_y", "length"), Coordinate("_3", "angle"))
     fixed_axes = "z"
     parallel_axes = "z"
 
 
-@dataclass(frozen=True)
 class Translational(AxisJoint):
     """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
 
     sentence = "S slides along the three axes of P without turning."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
-    type_name = "translational"
     look = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
     has_axis = False
     coordinates = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
     parallel_axes = "xyz"
 
 
-@dataclass(frozen=True)
 class Weld(AxisJoint):
     """S is fixed to P.  Allows 0, removes 6."""
 
     sentence = "S is fixed to P."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{0}"
-    type_name = "weld"
     look = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
     has_axis = False
     fixed_axes = "xyz"
@@ -459,7 +439,6 @@ class Weld(AxisJoint):
 TWO_ANGLES = (Coordinate("_1", "angle"), Coordinate("_2", "angle"))
 
 
-@dataclass(frozen=True)
 class Universal(Joint):
     """A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular.  Allows 2, removes 4.
 
@@ -468,7 +447,6 @@ class Universal(Joint):
 
     sentence = "A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{x}(q_1) \mathbf{R}_{y}(q_2), \quad \mathbf{u} = \mathbf{0}"
-    type_name = "universal"
     look = JointLook((SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y")))
     coordinates = TWO_ANGLES
     fixed_axes = "xyz"
@@ -487,7 +465,6 @@ class Universal(Joint):
         return [atan2(rotation[2][1], rotation[1][1]), atan2(rotation[0][2], rotation[0][0])]
 
 
-@dataclass(frozen=True)
 class ConstantVelocity(Joint):
     """The shaft bends in any direction, and S turns exactly as fast as P.  Allows 2, removes 4.
 
@@ -499,7 +476,6 @@ class ConstantVelocity(Joint):
 
     sentence = "The shaft along the axis {z} bends about any axis across it and passes its turning on evenly."
     formula = r"\omega_S \cdot \mathbf{e}_{z}^S = \omega_P \cdot \mathbf{e}_{z}^P"
-    type_name = "constant_velocity"
     look = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
     coordinates = TWO_ANGLES
     fixed_axes = "xyz"
@@ -543,7 +519,6 @@ ROTATION = Choice(
 PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
 
 
-@dataclass(frozen=True)
 class RotatingJoint(Joint):
     """What spherical and free joints share: how they describe a rotation.
 
@@ -588,19 +563,16 @@ class RotatingJoint(Joint):
         return [*position[: len(self.place)], *turn]
 
 
-@dataclass(frozen=True)
 class Spherical(RotatingJoint):
     """S turns freely about the common origin.  Allows 3, removes 3."""
 
     sentence = "S turns about its origin, which stays at the origin of P."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
-    type_name = "spherical"
     look = JointLook((SymbolPart("sphere", (1.0,)),))
     coordinates = ANGLES
     fixed_axes = "xyz"
 
 
-@dataclass(frozen=True)
 class Free(RotatingJoint):
     """S moves freely: three coordinates of its position in P axes, then its rotation.  Allows 6, removes 0."""
 
@@ -608,7 +580,6 @@ class Free(RotatingJoint):
     formula = (
         r"\mathbf{R}_{PS} = \mathbf{R}(q), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
     )
-    type_name = "free"
     place = PLACE
     coordinates = PLACE + ANGLES
 
@@ -658,7 +629,6 @@ SURFACE = GuidePoint(
 )
 
 
-@dataclass(frozen=True)
 class Guide(Joint):
     """The origin of S is at a point r of P that depends on the first coordinates, the parameters of the shape.
 
@@ -715,7 +685,6 @@ class TurningGuide(Guide):
         return euler(graph, self.sequence, angles), euler_rates(graph, self.sequence, angles)
 
 
-@dataclass(frozen=True)
 class CurveSlider(Guide):
     """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
 
@@ -723,12 +692,10 @@ class CurveSlider(Guide):
         "The origin of S slides along a curve of P without turning; the coordinate is the parameter of the curve."
     )
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
-    type_name = "curve_slider"
     coordinates = (Coordinate("", "length"),)
     curve: Shape = key(CURVE)
 
 
-@dataclass(frozen=True)
 class SurfaceSlider(Guide):
     """The origin of S slides on a surface of P, without turning: a particle in a bowl.  Allows 2, removes 4."""
 
@@ -736,12 +703,10 @@ class SurfaceSlider(Guide):
         "The origin of S slides on a surface of P without turning; the coordinates are the parameters of the surface."
     )
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
-    type_name = "surface_slider"
     coordinates = ON_SURFACE
     surface: Shape = key(SURFACE)
 
 
-@dataclass(frozen=True)
 class PointOnCurve(TurningGuide):
     """The origin of S slides along a curve of P; S turns freely, in Euler angles.  Allows 4, removes 2.
 
@@ -750,19 +715,16 @@ class PointOnCurve(TurningGuide):
 
     sentence = "The origin of S slides along a curve of P, and S turns freely."
     formula = r"\mathbf{u} = \mathbf{r}(q_1)"
-    type_name = "point_on_curve"
     coordinates = (*ALONG_CURVE, *ANGLES)
     curve: Shape = key(CURVE)
     sequence: str = key(SEQUENCE)
 
 
-@dataclass(frozen=True)
 class PointOnSurface(TurningGuide):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
     sentence = "The origin of S slides on a surface of P, and S turns freely."
     formula = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
-    type_name = "point_on_surface"
     coordinates = (*ON_SURFACE, *ANGLES)
     surface: Shape = key(SURFACE)
     sequence: str = key(SEQUENCE)
@@ -771,7 +733,6 @@ class PointOnSurface(TurningGuide):
 # -- rods and conditions on axes, without coordinates ------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class RodJoint(Joint):
     """Equations between the poses of two bodies; ``removes`` of the six degrees of freedom go."""
 
@@ -797,13 +758,11 @@ def apart(length: Expr, position: Vec3) -> Closure:
     return Closure("length", (vec.dot(position, position) - length * length) / (2.0 * length), "length")
 
 
-@dataclass(frozen=True)
 class Distance(RodJoint):
     """A massless rod with a ball joint at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
     sentence = "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
     formula = r"\mathbf{u}^T \mathbf{u} - l^2 = 0"
-    type_name = "distance"
     look = JointLook((SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True)
     has_axis = False
     removes = 1
@@ -813,13 +772,11 @@ class Distance(RodJoint):
         return [apart(self.length, position)]
 
 
-@dataclass(frozen=True)
 class RevoluteSpherical(RodJoint):
     """A massless rod of ``length`` turns about z of P, across it, with a ball joint at S.  Allows 4, removes 2."""
 
     sentence = "A massless rod of length $l$ turns about the axis {z} of P and holds S by a ball."
     formula = r"u_{z} = 0, \quad u_{x}^2 + u_{y}^2 - l^2 = 0"
-    type_name = "revolute_spherical"
     look = JointLook((SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True)
     removes = 2
     fixed_axes = "z"
@@ -829,61 +786,51 @@ class RevoluteSpherical(RodJoint):
         return [apart(self.length, position), *super().closure(graph, rotation, position)]
 
 
-@dataclass(frozen=True)
 class Inline(RodJoint):
     """The origin of S stays on the axis {z} of P.  Allows 4, removes 2."""
 
     sentence = "The origin of S stays on the axis {z} of P."
     formula = r"u_{x} = 0, \quad u_{y} = 0"
-    type_name = "inline"
     look = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     removes = 2
     fixed_axes = "xy"
 
 
-@dataclass(frozen=True)
 class Inplane(RodJoint):
     """The origin of S stays in the plane of P across the axis {z}.  Allows 5, removes 1."""
 
     sentence = "The origin of S stays in the plane of P across the axis {z}."
     formula = r"u_{z} = 0"
-    type_name = "inplane"
     look = JointLook((SymbolPart("sphere", (0.8,)),))
     removes = 1
     fixed_axes = "z"
 
 
-@dataclass(frozen=True)
 class Parallel(RodJoint):
     """The z axes stay parallel.  Allows 4, removes 2."""
 
     sentence = "The axes {z} of P and S stay parallel."
     formula = r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
-    type_name = "parallel"
     removes = 2
     parallel_axes = "z"
 
 
-@dataclass(frozen=True)
 class Perpendicular(RodJoint):
     """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
 
     sentence = "The axes {z} of P and S stay perpendicular."
     formula = r"\mathbf{e}_{z}^P \cdot \mathbf{e}_{z}^S = 0"
-    type_name = "perpendicular"
     removes = 1
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         return [Closure("z.z", rotation[2][2], "angle")]
 
 
-@dataclass(frozen=True)
 class Orientation(RodJoint):
     """S does not turn against P: all axes stay parallel, and the origins move freely.  Allows 3, removes 3."""
 
     sentence = "The axes of S stay parallel to those of P; the origins are free."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}"
-    type_name = "orientation"
     has_axis = False
     removes = 3
     parallel_axes = "xyz"
@@ -897,11 +844,13 @@ def joint(kind: type[Joint]) -> ElementType:
     return ElementType(kind.type_name, doc, kind.keys(), ends=("predecessor", "successor"), kind=kind)
 
 
-#: In the order of this file.
 JOINTS: Types = table(
-    *(
-        joint(one)
-        for one in list(vars().values())
-        if isinstance(one, type) and issubclass(one, Joint) and "type_name" in vars(one)
+    *map(
+        joint,
+        (
+            *(Revolute, Continuous, Prismatic, Screw, Cylindrical, Planar, Translational, Weld, Universal),
+            *(ConstantVelocity, Spherical, Free, CurveSlider, SurfaceSlider, PointOnCurve, PointOnSurface, Distance),
+            *(RevoluteSpherical, Inline, Inplane, Parallel, Perpendicular, Orientation),
+        ),
     )
 )

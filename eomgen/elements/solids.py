@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from functools import lru_cache
 from stat import S_ISREG
 from typing import ClassVar
@@ -17,10 +17,11 @@ from ..base.limits.numbers import MESH
 from ..errors import UsageError, bad_data, bad_file, off_range, too_large
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.tensors import add_matrices, shift_tensor
 from ..expr.vectors import Mat3, Vec3
 from .dimensions import LENGTH
+from .element_type import Element, key, keys_of
 from .kinds import Fields, Scalar, Vector
 
 # -- the class ---------------------------------------------------------------------------------------------------------
@@ -29,88 +30,71 @@ from .kinds import Fields, Scalar, Vector
 # integrate the density over each solid instead.
 
 
-@dataclass(frozen=True)
-class Solid(ABC):
-    """A solid of uniform density."""
+class Solid(Element):
+    """A solid of uniform density; its fields are its dimensions (m)."""
 
-    lengths: Mapping[str, Vec3]  #: dimensions (m); a single one is repeated three times
-
-    type_name: ClassVar[str]
     dimensions: ClassVar[Fields]  #: its keys
     has_axis: ClassVar[bool] = False  #: whether z of its own axes can be laid along an ``axis``
     content_key: ClassVar[str] = "density"  #: the key that gives the mass through :meth:`content`
 
-    def length(self, name: str) -> Expr:
-        """A dimension that is one length."""
-        return self.lengths[name][0]
-
-    @property
-    def graph(self) -> Graph:
-        """The graph of the dimensions."""
-        return next(iter(self.lengths.values()))[0].graph
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.dimensions = keys_of(cls)
 
     @abstractmethod
     def content(self) -> Expr:
         """What the density is multiplied with: the volume (m^3), of a rod its length (m)."""
 
     @abstractmethod
-    def gyration(self) -> Vec3:
+    def gyration(self) -> tuple[Expr | float, ...]:
         """Principal moments about the centre of mass in the solid's own axes, for each kg (m^2)."""
 
-    def centre(self) -> Vec3:
-        """Centre of mass from the solid's reference point, in its own axes (m)."""
-        return vec.zero(self.graph)
+    def centre(self) -> Expr | float:
+        """Centre of mass along z of its own axes, from the solid's reference point (m)."""
+        return 0.0
 
 
 # -- boxes, spheres, ellipsoids ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Box(Solid):
     """A rectangular block; edges along its axes."""
 
-    type_name = "box"
-    dimensions: ClassVar[Fields] = {"size": Vector("edges along x, y, z (m)", required=True, dimension=LENGTH)}
+    size: Vec3 = key(Vector("edges along x, y, z (m)", required=True, dimension=LENGTH))
 
     def content(self) -> Expr:
-        a, b, c = self.lengths["size"]
+        a, b, c = self.size
         return a * b * c
 
     def gyration(self) -> Vec3:
-        a, b, c = (x * x / 12.0 for x in self.lengths["size"])
+        a, b, c = (x * x / 12.0 for x in self.size)
         return (b + c, a + c, a + b)
 
 
-@dataclass(frozen=True)
 class Ellipsoid(Solid):
     """An ellipsoid; half axes along its axes."""
 
-    type_name = "ellipsoid"
-    dimensions: ClassVar[Fields] = {"semi_axes": Vector("half axes along x, y, z (m)", required=True, dimension=LENGTH)}
+    semi_axes: Vec3 = key(Vector("half axes along x, y, z (m)", required=True, dimension=LENGTH))
 
     def content(self) -> Expr:
-        a, b, c = self.lengths["semi_axes"]
+        a, b, c = self.semi_axes
         return (4.0 / 3.0 * math.pi) * a * b * c
 
     def gyration(self) -> Vec3:
-        a, b, c = (0.2 * x * x for x in self.lengths["semi_axes"])
+        a, b, c = (0.2 * x * x for x in self.semi_axes)
         return (b + c, a + c, a + b)
 
 
-@dataclass(frozen=True)
 class Sphere(Solid):
     """A ball."""
 
-    type_name = "sphere"
-    dimensions: ClassVar[Fields] = {"radius": Scalar("radius (m)", required=True, dimension=LENGTH)}
+    radius: Expr = key(Scalar("radius (m)", required=True, dimension=LENGTH))
 
     def content(self) -> Expr:
-        r = self.length("radius")
-        return (4.0 / 3.0 * math.pi) * r * r * r
+        return (4.0 / 3.0 * math.pi) * self.radius * self.radius * self.radius
 
     def gyration(self) -> Vec3:
-        r = self.length("radius")
-        return (0.4 * r * r,) * 3
+        return (0.4 * self.radius * self.radius,) * 3
 
 
 # -- solids of revolution ----------------------------------------------------------------------------------------------
@@ -120,100 +104,82 @@ _LENGTH = Scalar("length along the axis (m)", required=True, dimension=LENGTH)
 _RADIUS = Scalar("radius (m)", required=True, dimension=LENGTH)
 
 
-@dataclass(frozen=True)
 class Cylinder(Solid):
     """A full circular cylinder, placed by its centre; of length 0 a disc (which needs a mass)."""
 
-    type_name = "cylinder"
-    dimensions: ClassVar[Fields] = {"radius": _RADIUS, "length": _LENGTH}
     has_axis = True
+    radius: Expr = key(_RADIUS)
+    length: Expr = key(_LENGTH)
 
     def content(self) -> Expr:
-        r = self.length("radius")
-        return math.pi * r * r * self.length("length")
+        return math.pi * self.radius * self.radius * self.length
 
     def gyration(self) -> Vec3:
-        r, l = self.length("radius"), self.length("length")
+        r, l = self.radius, self.length
         across = r * r / 4.0 + l * l / 12.0
         return (across, across, 0.5 * r * r)
 
 
-@dataclass(frozen=True)
 class Tube(Solid):
     """A hollow circular cylinder, placed by its centre."""
 
-    type_name = "tube"
-    dimensions: ClassVar[Fields] = {
-        "outer_radius": Scalar("outer radius (m)", required=True, dimension=LENGTH),
-        "inner_radius": Scalar("inner radius (m)", required=True, dimension=LENGTH),
-        "length": _LENGTH,
-    }
     has_axis = True
+    outer_radius: Expr = key(_RADIUS.replace(doc="outer radius (m)"))
+    inner_radius: Expr = key(_RADIUS.replace(doc="inner radius (m)"))
+    length: Expr = key(_LENGTH)
 
     def content(self) -> Expr:
-        a, b = self.length("outer_radius"), self.length("inner_radius")
-        return math.pi * (a - b) * (a + b) * self.length("length")
+        a, b = self.outer_radius, self.inner_radius
+        return math.pi * (a - b) * (a + b) * self.length
 
     def gyration(self) -> Vec3:
-        a, b, l = self.length("outer_radius"), self.length("inner_radius"), self.length("length")
+        a, b, l = self.outer_radius, self.inner_radius, self.length
         square = a * a + b * b
         across = square / 4.0 + l * l / 12.0
         return (across, across, 0.5 * square)
 
 
-@dataclass(frozen=True)
 class Rod(Solid):
     """A thin straight rod, placed by its middle; ``line_density`` is its mass for each metre."""
 
-    type_name = "rod"
-    dimensions: ClassVar[Fields] = {"length": _LENGTH}
     has_axis = True
     content_key = "line_density"
+    length: Expr = key(_LENGTH)
 
     def content(self) -> Expr:
-        return self.length("length")
+        return self.length
 
-    def gyration(self) -> Vec3:
-        l = self.length("length")
-        across = l * l / 12.0
-        return (across, across, self.graph.zero)
+    def gyration(self) -> tuple[Expr | float, ...]:
+        across = self.length * self.length / 12.0
+        return (across, across, 0.0)
 
 
-@dataclass(frozen=True)
 class Cone(Solid):
     """A full circular cone, placed by the centre of its base, its apex along the axis."""
 
-    type_name = "cone"
-    dimensions: ClassVar[Fields] = {
-        "radius": Scalar("radius of the base (m)", required=True, dimension=LENGTH),
-        "length": Scalar("height along the axis (m)", required=True, dimension=LENGTH),
-    }
     has_axis = True
+    radius: Expr = key(_RADIUS.replace(doc="radius of the base (m)"))
+    length: Expr = key(_LENGTH.replace(doc="height along the axis (m)"))
 
     def content(self) -> Expr:
-        r = self.length("radius")
-        return (math.pi / 3.0) * r * r * self.length("length")
+        return (math.pi / 3.0) * self.radius * self.radius * self.length
 
     def gyration(self) -> Vec3:
-        r, h = self.length("radius"), self.length("length")
+        r, h = self.radius, self.length
         across = 0.15 * r * r + 0.0375 * h * h
         return (across, across, 0.3 * r * r)
 
-    def centre(self) -> Vec3:
-        zero = self.graph.zero
-        return (zero, zero, 0.25 * self.length("length"))
+    def centre(self) -> Expr:
+        return 0.25 * self.length
 
 
-SOLIDS: dict[str, type[Solid]] = {
-    solid.type_name: solid for solid in (Box, Cylinder, Tube, Sphere, Rod, Cone, Ellipsoid)
-}
+SOLIDS = {solid.type_name: solid for solid in (Box, Cylinder, Tube, Sphere, Rod, Cone, Ellipsoid)}
 
 
 # -- mass, centre of mass and inertia together -------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class MassProperties:
+class MassProperties(Record):
     """Mass (kg), centre of mass (m) and inertia about it (kg m^2), in body axes."""
 
     mass: Expr
@@ -250,8 +216,7 @@ def combine(graph: Graph, parts: Sequence[MassProperties]) -> MassProperties:
 # -- meshes: an STL file and the solid that it bounds, by trimesh ------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class MeshProperties:
+class MeshProperties(Record):
     """Volume, centre and inertia about it at density 1, in the units and axes of the file."""
 
     volume: float

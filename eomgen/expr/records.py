@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, dataclass_transform
 
 #: Objects of a class after which its ``__init__`` is compiled.
 MANY = 100
@@ -23,6 +23,14 @@ else:
         if kind is None and options == {"frozen": True}:
             return _freeze
         return dataclasses.dataclass(kind, **options)
+
+
+@dataclass_transform(frozen_default=True)
+class Record:
+    """A class whose subclasses are frozen dataclasses, each with its own fields beside those of its bases."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
 
 def _freeze(kind: type) -> type:

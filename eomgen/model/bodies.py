@@ -214,25 +214,22 @@ def _frame(reader: Reader, path: str, values: Mapping[str, Any]) -> Frame:
 def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> MassProperties | None:
     """What a solid has at density 1, its inertia for each kg, in its own axes."""
     solid, graph = SOLIDS[kind], reader.graph
-    lengths: dict[str, tuple[Expr, Expr, Expr]] = {}
+    lengths: dict[str, Any] = {}
     for key, dimension in solid.dimensions.items():
         if key not in values:
             return None
         place = f"{path}.{key}"
-        if isinstance(dimension, Vector):
-            lengths[key] = reader.vector(place, values[key])
-        else:
-            lengths[key] = (reader.expression(place, values[key]),) * 3
-        for x in dict.fromkeys(lengths[key]):
+        lengths[key] = value = dimension.read(reader, place, values[key])
+        for x in dict.fromkeys(value if isinstance(dimension, Vector) else [value]):
             advice = f"{values[key]!r} is negative".replace("{", "{{").replace("}", "}}")
             reader.requirements.inside(place, x, NOT_NEGATIVE, "a length must be 0 or positive", advice)
-    if "inner_radius" in lengths and "outer_radius" in lengths:
-        inner, outer = (lengths[key][0] for key in ("inner_radius", "outer_radius"))
+    if "inner_radius" in lengths:
+        inner, outer = lengths["inner_radius"], lengths["outer_radius"]
         message, remedy = "{:g} exceeds the outer radius {:g}", "give a smaller inner radius"
         reader.requirements.in_order(f"{path}.inner_radius", inner, outer, message, remedy)
-    made, o = solid(lengths), graph.zero
-    a, b, c = made.gyration()
-    return MassProperties(made.content(), made.centre(), ((a, o, o), (o, b, o), (o, o, c)))
+    made, o = solid(**lengths), graph.zero
+    a, b, c = map(graph.lift, made.gyration())
+    return MassProperties(made.content(), (o, o, graph.lift(made.centre())), ((a, o, o), (o, b, o), (o, o, c)))
 
 
 def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | None) -> MassProperties | None:

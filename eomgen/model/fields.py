@@ -133,23 +133,22 @@ FUNCTION: dict[str, Fields] = {
     },
 }
 _MASS = k.Scalar("mass (kg), instead of a density", dimension=MASS)
-_DENSITY = k.Scalar("density (kg/m^3)", dimension=Dimension(-3, 1))
+_DENSITIES = {
+    "density": k.Scalar("density (kg/m^3)", dimension=Dimension(-3, 1)),
+    "line_density": k.Scalar("mass per length (kg/m)", dimension=Dimension(-1, 1)),
+}
 _SUBTRACT = k.Flag("whether the solid is a hole", default=False)
 #: Type of solid -> its own keys; ``mesh`` is read from a file, the others are formulas.
 SOLID: dict[str, Fields] = {
-    name: dict(solid.dimensions)
+    name: solid.dimensions
     | ({"axis": k.Axis("direction of its z axis in the body", default="z")} if solid.has_axis else {})
-    | {
-        solid.content_key: _DENSITY
-        if solid.content_key == "density"
-        else k.Scalar("mass per length (kg/m)", dimension=Dimension(-1, 1))
-    }
+    | {solid.content_key: _DENSITIES[solid.content_key]}
     for name, solid in SOLIDS.items()
 } | {
     "mesh": {
         "file": k.File("STL file; its path from the folder of the model file", required=True),
         "scale": k.Scalar("metres in one unit of the file", default=1, dimension=LENGTH),
-        "density": _DENSITY,
+        "density": _DENSITIES["density"],
     }
 }
 

@@ -8,10 +8,11 @@ from abc import abstractmethod
 import numpy as np
 
 from ...base.limits.numbers import ZERO
+from ...base.value_rules import POSITIVE
 from ...expr.core import Expr, atan2, cos, sin, sqrt, substitute, symbols_of
 from ...expr.differentiate import jvp
 from ...expr.evaluate import evaluate
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ..dimensions import LENGTH, NONE, REACH
 from ..element_type import ElementType, Entry, table
 from ..frames import Frame, Marker
@@ -25,8 +26,7 @@ from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 TRIALS = 5
 
 
-@dataclass(frozen=True)
-class Profile:
+class Profile(Record):
     """f(theta), theta from 0 to a full turn; ``local`` is the symbol that stands for theta in ``expression``.
 
     Beyond one turn it repeats if ``periodic``: theta then is brought back to [0, 2 pi], unless the expression repeats
@@ -102,7 +102,6 @@ def _polar(cam: Marker, contour: Profile, follower: Marker, face: bool = False) 
     return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi, follower, face)
 
 
-@dataclass(frozen=True)
 class CamLift(Constraint):
     """The follower's coordinate is a given function of the cam's: s = lift(theta - phase)."""
 
@@ -123,7 +122,6 @@ class CamLift(Constraint):
         return [Condition("lift", self.follower - self.lift.at(self.cam - self.phase), self.kind)]
 
 
-@dataclass(frozen=True)
 class KnifeContact(Constraint):
     """The follower marker's origin lies on the contour: |p| = r(theta of p), p in the cam's axes."""
 
@@ -142,7 +140,6 @@ class KnifeContact(Constraint):
         return [Condition("contact", sqrt(x * x + y * y) - self.contour.toward(x, y), "length")]
 
 
-@dataclass(frozen=True)
 class FlatSupport(Constraint):
     """A flat face touches a cam given by its support function: n . p = h(theta of n), p a point of the face.
 
@@ -171,7 +168,6 @@ class FlatSupport(Constraint):
         return [Condition("contact", n_x * x + n_y * y - self.support.toward(n_x, n_y), "length")]
 
 
-@dataclass(frozen=True)
 class _Contact(Constraint):
     """Contact at a point of the contour whose polar angle is unknown: ``angle``, the turn of marker ``point``.
 
@@ -203,7 +199,6 @@ class _Contact(Constraint):
         """The direction in which contact is to be looked for, in the axes in which the follower is given."""
 
 
-@dataclass(frozen=True)
 class RollerContact(_Contact):
     """A roller of radius R whose centre is the follower's marker: p = r e_r + R n."""
 
@@ -226,7 +221,6 @@ class RollerContact(_Contact):
         ]
 
 
-@dataclass(frozen=True)
 class FlatContact(_Contact):
     """A flat face through the follower's marker, normal to its z axis n, which points away from the cam.
 
@@ -271,12 +265,8 @@ def _cam(e: Entry) -> CamLift | None:
     for key, result in (("cam", turning), ("follower", follower)):
         if result.kind not in ("angle", "length"):
             message = f"the coordinate {result.name!r} is neither an angle nor a length"
-            e.fault(
-                key,
-                message,
-                "name an angle or a length; with rotation: euler_angles a joint has angles",
-                "EG-REFERENCE",
-            )
+            remedy = "name an angle or a length; with rotation: euler_angles a joint has angles"
+            e.fault(key, message, remedy, "EG-REFERENCE")
     if e.values.get("periodic") is True and turning.kind == "length":
         message = f"the cam slides ({turning.name!r} is a length), so its profile has no turn to repeat after"
         remedy = "leave it out, or write the repetition into lift, as with sin(2*pi*theta/l)"
@@ -289,8 +279,7 @@ def _cam(e: Entry) -> CamLift | None:
 
 def _cam_contact(e: Entry) -> Constraint | None:
     shape, axis, follower = e["shape"], e["cam"], e["follower"]
-    if axis is not None and follower is not None:
-        on_two_bodies(e, "follower", axis, follower)
+    on_two_bodies(e, "follower", axis, follower)
     if e.at_fault("shape"):
         return None
     if shape != "roller":
@@ -313,7 +302,7 @@ def _cam_contact(e: Entry) -> Constraint | None:
     if contact is None:
         return None
     if shape == "roller":
-        return RollerContact(e.name, axis, follower, profile, *contact, e.positive("radius"))
+        return RollerContact(e.name, axis, follower, profile, *contact, e["radius"])
     return FlatContact(e.name, axis, follower, profile, *contact)
 
 
@@ -361,7 +350,7 @@ TYPES = table(
                 dimension=LENGTH,
                 local=_TURN,
             ),
-            "radius": Scalar("radius of the roller (m)", dimension=LENGTH),
+            "radius": Scalar("radius of the roller (m)", dimension=LENGTH, allowed=POSITIVE),
             "coordinate": CoordinateName("name of the polar angle of the contact point (<name>_contact)"),
             "latex": Latex("how formulas and plots print that angle, in LaTeX (from its name unless given)"),
             "periodic": _PERIODIC,

@@ -6,13 +6,12 @@ Coordinates are held as symbols under their own names; the kinematics stage repl
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
 from ...expr.core import Expr, is_comparison, symbols_of
 from ...expr.differentiate import gradient
-from ...expr.records import dataclass
-from ..element_type import ElementType, Entry, Meaning, table
+from ..element_type import Element, ElementType, Entry, Meaning, table
 from ..frames import Frame, Marker, MotionView
 from ..kinds import OUTPUT, Factors, Scalar
 from ..looks import Seen
@@ -41,8 +40,7 @@ class Condition(NamedTuple):
     level: str = POSITION
 
 
-@dataclass(frozen=True)
-class Constraint(ABC):
+class Constraint(Element):
     """A constraint element.  ``name`` is the user's; a subclass adds its coordinates, markers and dimensions.
 
     ``sentence`` and ``formula`` (LaTeX) say its condition, for readers.
@@ -75,8 +73,10 @@ class Constraint(ABC):
         return []
 
 
-def on_two_bodies(e: Entry, key: str, a: Marker, b: Marker) -> bool:
-    """Whether two markers are on different bodies, which is noted where they are not."""
+def on_two_bodies(e: Entry, key: str, a: Marker | None, b: Marker | None) -> bool:
+    """Whether there are two markers, on different bodies; the same body is noted."""
+    if a is None or b is None:
+        return False
     if a.body == b.body:
         remedy = "choose a marker on another body for one of them"
         e.fault(key, f"{a.label} and {b.label} are on the same body", remedy, "EG-REFERENCE")
@@ -102,13 +102,11 @@ _UNUSABLE = {
 }
 
 
-@dataclass(frozen=True)
 class Linear(Constraint):
     """A linear relation: sum of factor times coordinate = offset (Shabana, Computational Dynamics, sec. 3.2)."""
 
     sentence = "A linear relation between coordinates."
     formula = r"\Sigma_k c_k q_k = c_0"
-    type_name = "linear"
     written = True
     terms: tuple[tuple[Expr, Expr], ...]  #: (coordinate, factor)
     offset: Expr
@@ -121,13 +119,11 @@ class Linear(Constraint):
         return [Condition("relation", total, self.kind)]
 
 
-@dataclass(frozen=True)
 class Equation(Constraint):
     """Any expression held at zero; nonholonomic (``level`` 'velocity') if it is linear in velocities."""
 
     sentence = "An equation that the model gives."
     formula = r"C = 0"
-    type_name = "equation"
     written = True
     expression: Expr
     kind: str

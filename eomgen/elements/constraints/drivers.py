@@ -10,7 +10,6 @@ from abc import abstractmethod
 
 from ...expr import vectors as vec
 from ...expr.core import Expr, reachable, sqrt, symbols_of
-from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..dimensions import REACH
 from ..element_type import ElementType, Entry, table
@@ -23,7 +22,6 @@ from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 ROUGH = ("monotone",)
 
 
-@dataclass(frozen=True)
 class Driver(Constraint):
     """A measure that follows ``value``, an expression of t and parameters; its row is called ``<name>.motion``."""
 
@@ -40,7 +38,6 @@ class Driver(Constraint):
         return [Condition("motion", measure - self.value, kind)]
 
 
-@dataclass(frozen=True)
 class CoordinateDriver(Driver):
     """The coordinate of a joint."""
 
@@ -59,7 +56,6 @@ class CoordinateDriver(Driver):
         return [(self.coordinate, self.value)]
 
 
-@dataclass(frozen=True)
 class DistanceDriver(Driver):
     """The distance between the origins of two markers, which must not meet."""
 
@@ -72,7 +68,6 @@ class DistanceDriver(Driver):
         return sqrt(vec.dot(d, d)), "length"
 
 
-@dataclass(frozen=True)
 class PlaceDriver(Driver):
     """The place of a marker's origin along ``axis``, a unit vector in the axes of marker ``on``, from its origin."""
 
@@ -85,7 +80,6 @@ class PlaceDriver(Driver):
         return vec.dot(self.axis, view.relative(self.on, self.marker).position), "length"
 
 
-@dataclass(frozen=True)
 class AngleDriver(Driver):
     """The turn of one marker about the z axis of another; the two z axes stay in line."""
 
@@ -113,9 +107,7 @@ def _driver(e: Entry) -> Driver | None:
         return None if result is None else CoordinateDriver(e.name, value, e.symbol(result), result.kind)
     if "marker" in e.values:
         marker, on, axis = e["marker"], e["on"], e["axis"]
-        if marker is None or on is None or not on_two_bodies(e, "on", marker, on):
-            return None
-        return PlaceDriver(e.name, value, marker, axis, on)
+        return PlaceDriver(e.name, value, marker, axis, on) if on_two_bodies(e, "on", marker, on) else None
     key = "between" if "between" in e.values else "angle"
     pair = e.pair(key)
     if pair is None or not on_two_bodies(e, key, *pair):

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ...base.value_rules import POSITIVE
 from ...base.value_rules import WHEELS as WHEELS_FIT
 from ...expr.core import Expr, sin
-from ...expr.records import dataclass
 from ..dimensions import LENGTH, NONE
-from ..element_type import ElementType, Entry, Found, table
-from ..kinds import Flag, JointPair, JointReference, Scalar, Two, Wheels
+from ..element_type import ElementType, Entry, Found, Where, element, key, table
+from ..kinds import Fields, Flag, JointPair, JointReference, Scalar, Two, Wheels
 from ..looks import PitchCircles, RackAndPinion, Seen
 from .constraint import Condition, Constraint, ConstraintView
 
 
-@dataclass(frozen=True)
 class Pair(Constraint):
     """Two angles, measured from the part that carries the two axes, in a fixed ratio: a + ratio b = phase."""
 
@@ -26,7 +24,7 @@ class Pair(Constraint):
     a: Expr
     b: Expr
     ratio: Expr
-    phase: Expr
+    phase: Expr = key(Scalar("first angle at which the second angle is 0 (rad)", default=0, dimension=NONE))
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("ratio", self.a + self.ratio * self.b - self.phase, "angle")]
@@ -39,38 +37,32 @@ class Gear(Pair):
     Norton, Design of Machinery, eq. 9.1).
     """
 
-    type_name: ClassVar[str] = "gear"
-
     def drawn(self) -> list[Seen]:
         return [PitchCircles(self.a, self.b, self.ratio)]
 
 
-@dataclass(frozen=True)
 class Belt(Pair):
     """A belt or chain that does not stretch or slip on two pulleys: r_a a = r_b b, with b reversed where it crosses.
 
     (Norton, Design of Machinery, sec. 9.11.)
     """
 
-    type_name: ClassVar[str] = "belt"
     radius: Expr | None = None  #: of the first pulley, for its picture; None where teeth are given
 
     def drawn(self) -> list[Seen]:
         return [PitchCircles(self.a, self.b, self.ratio, belt=True, radius=self.radius)]
 
 
-@dataclass(frozen=True)
 class Rack(Constraint):
     """A pinion that rolls on a rack: s = r a + offset (Norton, Design of Machinery, sec. 9.3)."""
 
     sentence = "A pinion of radius $r$ rolls on a rack."
     formula = r"s = r a + s_0"
-    type_name = "rack"
     written = True
-    pinion: Expr
-    rack: Expr
-    radius: Expr
-    offset: Expr
+    pinion: Expr = key(JointReference("joint of the pinion", required=True, measure="angle"))
+    rack: Expr = key(JointReference("joint of the rack", required=True, measure="length"))
+    radius: Expr = key(Scalar("radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH))
+    offset: Expr = key(Scalar("travel of the rack at which the pinion's angle is 0 (m)", default=0, dimension=LENGTH))
 
     def drawn(self) -> list[Seen]:
         return [RackAndPinion(self.pinion, self.rack, self.radius)]
@@ -91,89 +83,54 @@ def _ratio(e: Entry) -> Expr | None:
     return b / a
 
 
-def _angles(e: Entry) -> tuple[Found, Found] | None:
-    """Two angles whose axes are carried by one part."""
+def _wheels(e: Entry) -> tuple[Expr, Expr, Expr] | None:
+    """Two angles whose axes one part carries, and the ratio, negative where both turn the same way."""
     pair: tuple[Found, Found] | None = e["joints"]
     if pair is not None:
         e.require_one_carrier("joints", *pair)
-    return pair
-
-
-def _gear(e: Entry) -> Gear | None:
-    pair, ratio = _angles(e), _ratio(e)
+    ratio, opposite = _ratio(e), e["crossed"] if "crossed" in e.fields else not e["internal"]
     if pair is None or ratio is None:
         return None
-    ratio = -ratio if e["internal"] else ratio
-    return Gear(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e["phase"])
+    return e.symbol(pair[0]), e.symbol(pair[1]), ratio if opposite else -ratio
 
 
-def _belt(e: Entry) -> Belt | None:
-    pair, ratio = _angles(e), _ratio(e)
-    if pair is None or ratio is None:
-        return None
-    ratio = ratio if e["crossed"] else -ratio
-    radii = e["radii"]
-    return Belt(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e["phase"], radii[0] if radii else None)
+def _check_pulleys(e: Entry, values: dict[str, Any]) -> None:
+    values["radius"] = (e["radii"] or [None])[0]
 
 
-def _rack(e: Entry) -> Rack | None:
-    pinion, rack_coordinate = e["pinion"], e["rack"]
-    if pinion is None or rack_coordinate is None:
-        return None
-    e.require_one_carrier("", pinion, rack_coordinate)
-    return Rack(e.name, e.symbol(pinion), e.symbol(rack_coordinate), e["radius"], e["offset"])
+def _check_carrier(e: Entry, values: dict[str, Any]) -> None:
+    if values["pinion"] is not None and values["rack"] is not None:
+        e.require_one_carrier("", values["pinion"], values["rack"])
 
 
-_JOINTS = JointPair(
-    "two joints of one degree, or coordinates, with the same predecessor", required=True, measure="angle"
+_SIZES: Fields = {
+    "joints": JointPair(
+        "two joints of one degree, or coordinates, with the same predecessor", required=True, measure="angle"
+    ),
+    "radii": Two("base or pitch circle radii (m), in the order of the joints", dimension=LENGTH),
+    "teeth": Two("numbers of teeth", dimension=NONE),
+}
+_CONES = Two(
+    "pitch cone angles of a bevel pair (rad); both z axes point away from their intersection, or both to it",
+    dimension=NONE,
 )
-_RADII = Two("base or pitch circle radii (m), in the order of the joints", dimension=LENGTH)
-_TEETH = Two("numbers of teeth", dimension=NONE)
-_PHASE = Scalar("first angle at which the second angle is 0 (rad)", default=0, dimension=NONE)
-_JOINT = JointReference("a joint of one degree, or a coordinate", required=True)
+_INTERNAL = Flag("whether one gear is internal, so that both turn the same way", default=False)
+_CROSSED = Flag("whether the belt crosses, so that the pulleys turn in opposite directions", default=False)
 
 TYPES = table(
-    ElementType(
+    element(
+        Gear,
         "gear",
         "two gears that mesh: r_a a + r_b b = r_a phase, or r_a a - r_b b = r_a phase if one is internal.",
-        {
-            "joints": _JOINTS,
-            "radii": _RADII,
-            "teeth": _TEETH,
-            "cones": Two(
-                "pitch cone angles of a bevel pair (rad); both z axes point away from their intersection, or both to "
-                "it",
-                dimension=NONE,
-            ),
-            "internal": Flag("whether one gear is internal, so that both turn the same way", default=False),
-            "phase": _PHASE,
-        },
-        _gear,
-        one_of=("radii", "teeth", "cones"),
+        Where({**_SIZES, "cones": _CONES, "internal": _INTERNAL}, _wheels, one_of=("radii", "teeth", "cones")),
     ),
-    ElementType(
-        "rack",
-        "a pinion that rolls on a rack: s = radius angle + offset (m).",
-        {
-            "pinion": _JOINT.replace(doc="joint of the pinion", measure="angle"),
-            "rack": _JOINT.replace(doc="joint of the rack", measure="length"),
-            "radius": Scalar("radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH),
-            "offset": Scalar("travel of the rack at which the pinion's angle is 0 (m)", default=0, dimension=LENGTH),
-        },
-        _rack,
-    ),
-    ElementType(
+    element(Rack, "rack", "a pinion that rolls on a rack: s = radius angle + offset (m).", check=_check_carrier),
+    element(
+        Belt,
         "belt",
         "a belt without slip on two pulleys: r_a (a - phase) = r_b b, or -r_b b if the belt crosses.",
-        {
-            "joints": _JOINTS,
-            "radii": _RADII,
-            "teeth": _TEETH,
-            "crossed": Flag("whether the belt crosses, so that the pulleys turn in opposite directions", default=False),
-            "phase": _PHASE,
-        },
-        _belt,
-        one_of=("radii", "teeth"),
+        Where({**_SIZES, "crossed": _CROSSED}, _wheels, one_of=("radii", "teeth")),
+        check=_check_pulleys,
     ),
 )
 
@@ -181,7 +138,6 @@ TYPES = table(
 # -- planetary sets ----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Planetary(Constraint):
     """A planetary set; angles of sun, ring and carrier from the frame, that of the planet from the carrier.
 
@@ -195,7 +151,6 @@ class Planetary(Constraint):
 
     sentence = "The angles of sun, ring and carrier of a planetary set with the radii $r_s$ and $r_r$."
     formula = r"\frac{r_s \varphi_s + r_r \varphi_r}{r_s + r_r} = \varphi_c"
-    type_name = "planetary"
     written = True
     sun: Expr
     ring: Expr
@@ -261,9 +216,8 @@ def _planetary(e: Entry) -> Planetary | None:
     if "planet" in parts and len(sizes) < 2:
         e.fault(key, "one size does not determine a ratio", f"give two of {', '.join(Wheels.names)}", "EG-MISSING")
     if len(parts) < (2 if "planet" in parts else 1) or not main:
-        e.fault(
-            "", "too few parts of the set can move", "give joints for more of sun, ring, carrier, planet", "EG-MISSING"
-        )
+        remedy = "give joints for more of sun, ring, carrier, planet"
+        e.fault("", "too few parts of the set can move", remedy, "EG-MISSING")
     if e.at_fault():
         return None
     sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))

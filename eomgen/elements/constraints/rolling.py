@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from typing import Any
 
 from ...base.value_rules import POSITIVE, SUPPORT
 from ...expr import vectors as vec
 from ...expr.core import Expr, cos, sin, sqrt, substitute
 from ...expr.differentiate import jvp
-from ...expr.records import dataclass
 from ...expr.vectors import Vec3
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, element, key, table
@@ -48,7 +48,6 @@ def _along(x: Expr, local: Vec3, k: int) -> Expr:
 LYING = "the disc lies flat (axle along the plane's normal)"
 
 
-@dataclass(frozen=True)
 class Rolling(Constraint):
     """A body that rolls on the x-y plane of marker ``plane``, on the side to which its z axis points."""
 
@@ -78,7 +77,6 @@ class Rolling(Constraint):
         ]
 
 
-@dataclass(frozen=True)
 class Wheeled(Rolling):
     """A body of one radius."""
 
@@ -92,7 +90,6 @@ def _normal(view: ConstraintView, plane: Marker) -> Vec3:
     return vec.transpose(view.rotation(plane))[2]
 
 
-@dataclass(frozen=True)
 class RollingDisc(Wheeled):
     """A disc or wheel: a circle about the wheel's z axis, rounded by a tube of radius ``tube`` (0 for a sharp edge).
 
@@ -100,7 +97,6 @@ class RollingDisc(Wheeled):
     (radius - tube) s + tube above the plane.  The wheel may lean but not lie down (s > 0).
     """
 
-    type_name = "rolling_disc"
     tube: Expr
 
     def _lean(self, view: ConstraintView) -> tuple[Vec3, Vec3, Expr]:
@@ -125,11 +121,9 @@ class RollingDisc(Wheeled):
         return vec.sub(rim, vec.scale(self.tube, n))
 
 
-@dataclass(frozen=True)
 class RollingSphere(Wheeled):
     """A ball about the marker's origin; with ``no_spin`` it does not turn about the normal either."""
 
-    type_name = "rolling_sphere"
     no_spin: bool = False
 
     def height(self, view: ConstraintView) -> Expr:
@@ -146,7 +140,6 @@ class RollingSphere(Wheeled):
         return rows
 
 
-@dataclass(frozen=True)
 class KnifeEdge(Constraint):
     """A blade, or a small wheel upright on its plane: the marker does not move along ``axis`` of its own axes.
 
@@ -155,7 +148,6 @@ class KnifeEdge(Constraint):
 
     sentence = r"The marker does not move along one of its axes $\mathbf{n}$."
     formula = r"\mathbf{n}^T \mathbf{v} = 0"
-    type_name = "knife_edge"
     marker: Marker = key(MarkerReference("marker at the point where the blade touches", required=True))
     axis: Vec3 = key(Axis("direction in which the marker cannot move, in its own axes", default="y"))
     on: Marker = key(MarkerReference("the body on which the blade moves", default="ground"))
@@ -178,11 +170,9 @@ class KnifeEdge(Constraint):
 NORMAL = ("nx", "ny", "nz")  #: what a formula of a support calls the components of the normal
 
 
-@dataclass(frozen=True)
 class RollingConvex(Rolling):
     """A body whose support is a formula of the outward normal in the axes of marker ``wheel``, at its centre."""
 
-    type_name = "rolling_convex"
     support: Expr
     local: Vec3  #: symbols of the formula
 
@@ -246,9 +236,9 @@ def _rolling(e: Entry) -> Constraint | None:
     if wheel is None or plane is None or e.at_fault() or not on_two_bodies(e, "plane", wheel, plane):
         return None
     if shape == "sphere":
-        return RollingSphere(e.name, wheel, plane, e.positive("radius"), e["no_spin"])
+        return RollingSphere(e.name, wheel, plane, e["radius"], e["no_spin"])
     if shape == "disc":
-        return RollingDisc(e.name, wheel, plane, e.positive("radius"), e["tube"])
+        return RollingDisc(e.name, wheel, plane, e["radius"], e["tube"])
     symbols = {name: e.graph.symbol(f"{name} of {e.name}") for name in NORMAL}
     local = (symbols["nx"], symbols["ny"], symbols["nz"])
     if shape == "convex":
@@ -256,16 +246,13 @@ def _rolling(e: Entry) -> Constraint | None:
         if not e.at_fault():
             require_convex(e, support, local)
         return RollingConvex(e.name, wheel, plane, support, local)
-    a, b, c = e["semi_axes"]
-    for k, x in enumerate((a, b, c)):
+    for k, x in enumerate(semi_axes := e["semi_axes"]):
         e.require(f"semi_axes[{k}]", x, POSITIVE, "must be greater than 0")
-    return RollingConvex(e.name, wheel, plane, ellipsoid_support(local, (a, b, c)), local)
+    return RollingConvex(e.name, wheel, plane, ellipsoid_support(local, semi_axes), local)
 
 
-def _check_blade(e: Entry) -> None:
-    marker, on = e["marker"], e["on"]
-    if marker is not None and on is not None:
-        on_two_bodies(e, "on", marker, on)
+def _check_blade(e: Entry, values: dict[str, Any]) -> None:
+    on_two_bodies(e, "on", values["marker"], values["on"])
 
 
 TYPES = table(
@@ -277,7 +264,7 @@ TYPES = table(
             "plane": MarkerReference(
                 "marker in the plane; z is its normal and points to the wheel's side", default="ground"
             ),
-            "radius": Scalar("radius of a disc or a sphere (m)", dimension=LENGTH),
+            "radius": Scalar("radius of a disc or a sphere (m)", dimension=LENGTH, allowed=POSITIVE),
             "shape": Choice("shape of the wheel", default="disc", choices=tuple(_NEEDED)),
             "tube": Scalar("radius of the rounded edge of a disc (m), 0 for a sharp edge", default=0, dimension=LENGTH),
             "no_spin": Flag("whether the sphere is kept from spinning about the plane's normal", default=False),

@@ -7,9 +7,8 @@ from typing import Any
 
 from ...expr import vectors as vec
 from ...expr.core import Expr
-from ...expr.records import dataclass
 from ..dimensions import SPIN
-from ..element_type import ElementType, Entry, Types, table
+from ..element_type import ElementType, Entry, Types, Where, element, key, table
 from ..frames import Marker, velocity_at
 from ..kinds import LAW, Choice, Fields, Flag, JointReference, Pair, Scalar, SomeNames
 from ..looks import CROSS, Drawn, Seen
@@ -63,7 +62,6 @@ def event_of(name: str, key: str) -> str:
 AXES = ("xyz", "xy", "x", "y", "z", "xz", "yz")
 
 
-@dataclass(frozen=True)
 class Hold(Constraint):
     """A marker that does not move on the body of another marker, along some of that marker's axes.
 
@@ -72,11 +70,14 @@ class Hold(Constraint):
 
     sentence = "The marker does not move on the other body while it is held."
     formula = r"\mathbf{v}_b - \mathbf{v}_a = \mathbf{0}"
-    type_name = "hold"
     on: Marker
     marker: Marker
-    axes: str
-    turning: str
+    axes: str = key(
+        Choice("axes of the first marker along which the second does not move", default="xyz", choices=AXES)
+    )
+    turning: str = key(
+        Choice("axes of the first marker about which the second does not turn", default="none", choices=("none", *AXES))
+    )
 
     def drawn(self) -> list[Seen]:
         return [Drawn((self.marker,), about=CROSS)]
@@ -91,13 +92,11 @@ class Hold(Constraint):
         return rows + [Condition(f"w{axis}", spin["xyz".index(axis)], "angle", VELOCITY) for axis in self.turning]
 
 
-@dataclass(frozen=True)
 class Lock(Constraint):
     """A joint whose coordinates, or one of them, do not change: it is held wherever it is."""
 
     sentence = "The coordinates of the joint do not change while it is locked."
     formula = r"\dot{q}_k = 0"
-    type_name = "lock"
     velocities: tuple[tuple[str, Expr, str], ...]  #: label, the velocity, 'length' or 'angle'
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
@@ -110,12 +109,14 @@ def _require_switch(e: Entry, otherwise: str) -> None:
         e.fault("", "is neither closed nor opened", remedy, "EG-MISSING")
 
 
-def _hold(e: Entry) -> Constraint | None:
-    pair, axes, turning = e.pair(), e["axes"], e["turning"]
+def _pair(e: Entry) -> tuple[Marker, Marker] | None:
     _require_switch(e, "a joint holds bodies")
-    if pair is None or not on_two_bodies(e, "between", *pair):
-        return None
-    return Hold(e.name, *pair, axes, "" if turning == "none" else turning)
+    pair = e.pair()
+    return pair if pair is not None and on_two_bodies(e, "between", *pair) else None
+
+
+def _check_turning(e: Entry, values: dict[str, Any]) -> None:
+    values["turning"] = values["turning"].removeprefix("none")
 
 
 def _lock(e: Entry) -> Constraint | None:
@@ -125,19 +126,12 @@ def _lock(e: Entry) -> Constraint | None:
 
 
 TYPES = table(
-    ElementType(
+    element(
+        Hold,
         "hold",
         "a marker fixed on another body at its place of closing: a foot on the ground, a grasp, a clutch.",
-        {
-            "between": Pair("marker of the holding body, and the marker that it holds", required=True),
-            "axes": Choice(
-                "axes of the first marker along which the second does not move", default="xyz", choices=AXES
-            ),
-            "turning": Choice(
-                "axes of the first marker about which the second does not turn", default="none", choices=("none", *AXES)
-            ),
-        },
-        _hold,
+        Where({"between": Pair("marker of the holding body, and the marker that it holds", required=True)}, _pair),
+        check=_check_turning,
     ),
     ElementType(
         "lock",

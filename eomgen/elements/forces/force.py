@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ...expr import vectors as vec
 from ...expr.core import Expr
-from ...expr.records import dataclass
 from ...expr.vectors import Vec3
+from ..element_type import Element
 from ..frames import Marker, MotionView
 from ..looks import Seen
 
@@ -100,8 +100,7 @@ class Measured(NamedTuple):
     force: Expr
 
 
-@dataclass(frozen=True)
-class Force(ABC):
+class Force(Element):
     """A force element.  ``name`` is the user's; a subclass adds its markers and laws.
 
     ``sentence`` and ``formula`` (LaTeX) say its law, for readers.

@@ -12,10 +12,10 @@ from ...base.limits.numbers import AT_REST
 from ...base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
 from ...expr import vectors as vec
 from ...expr.core import Expr, Graph, sqrt
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
-from ..element_type import ElementType, Entry, Law, Types, key, law, table
+from ..element_type import ElementType, Entry, Law, Types, element, key, table
 from ..kinds import LAW, Choice, Fields, Scalar
 from .force import Force, View, beyond_zero, map_law, where
 from .paths import ON_JOINT, Path, PathForce, read_coordinate
@@ -24,7 +24,7 @@ from .springs import Damper
 # -- dry friction ------------------------------------------------------------------------------------------------------
 
 
-class DryFriction(ABC):
+class DryFriction(Record, ABC):
     """What opposes sliding in a contact, as a part of the normal force; ``formula`` says it in LaTeX."""
 
     formula: ClassVar[str]
@@ -129,7 +129,6 @@ UNIT = "J^0.5"  #: of the state of a contact
 SUMS = 3  #: how many numbers :meth:`LuGre.sums` has beside one for each state
 
 
-@dataclass(frozen=True)
 class LuGre(LineFriction):
     """Friction of bristles whose state holds a body at rest.
 
@@ -285,7 +284,6 @@ class SlidingFriction(LineFriction):
         return vec.scale(self.per_velocity(vec.dot(slip.velocity, slip.velocity)), slip.velocity)
 
 
-@dataclass(frozen=True)
 class Friction(SlidingFriction):
     """Coulomb and Stribeck friction; what multiplies the direction of sliding, opposed to it.
 
@@ -324,7 +322,6 @@ class Friction(SlidingFriction):
         return self.level(squared) / size + self.viscous
 
 
-@dataclass(frozen=True)
 class BrownMcPhee(SlidingFriction):
     """Friction of continuous derivatives whose largest value is the static friction, close to v = transition.
 
@@ -403,9 +400,9 @@ def _check_bristles(e: Entry, values: dict[str, Any]) -> None:
 BRISTLES = "lugre"  #: the type that has states
 #: Laws of dry friction, as parts of the normal force.
 FRICTIONS = table(
-    law(Friction, "coulomb", "smoothed, with the Stribeck effect if wanted.", check=_check_onset),
-    law(BrownMcPhee, "brown_mcphee", "of continuous derivatives.", check=_check_greatest),
-    law(LuGre, BRISTLES, "bristles that hold a body at rest.", check=_check_bristles),
+    element(Friction, "coulomb", "smoothed, with the Stribeck effect if wanted.", check=_check_onset),
+    element(BrownMcPhee, "brown_mcphee", "of continuous derivatives.", check=_check_greatest),
+    element(LuGre, BRISTLES, "bristles that hold a body at rest.", check=_check_bristles),
 )
 
 
@@ -451,7 +448,6 @@ def is_reaction(symbol: str) -> bool:
 # -- by reactions ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class ReactionFriction(PathForce):
     """Friction by the force that the joint carries: -[(c(v) + m(v) N) tanh(v / smoothing) + viscous v].
 
@@ -485,11 +481,20 @@ class ReactionFriction(PathForce):
 
 #: Keys of friction by the joint's reaction.
 BY_REACTION: Fields = {
-    "coefficient": Scalar("friction coefficient, times the joint reaction across the axis", level=LAW, dimension=NONE),
-    "static_coefficient": Scalar("the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE),
-    "radius": Scalar("radius of the pin (m), where the coordinate is an angle", dimension=LENGTH),
+    "coefficient": Scalar(
+        "friction coefficient, times the joint reaction across the axis",
+        level=LAW,
+        dimension=NONE,
+        allowed=NOT_NEGATIVE,
+    ),
+    "static_coefficient": Scalar(
+        "the same at the onset of sliding; give stribeck too", level=LAW, dimension=NONE, allowed=NOT_NEGATIVE
+    ),
+    "radius": Scalar("radius of the pin (m), where the coordinate is an angle", dimension=LENGTH, allowed=POSITIVE),
     "thrust_radius": Scalar(
-        "mean radius of the collar (m) on which the reaction along the axis rubs; none by default", dimension=LENGTH
+        "mean radius of the collar (m) on which the reaction along the axis rubs; none by default",
+        dimension=LENGTH,
+        allowed=POSITIVE,
     ),
 }
 
@@ -507,13 +512,8 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if "smoothing" not in e.values:
         e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
-    coefficient, onset, preload, breakaway = (
-        e[key] for key in ("coefficient", "static_coefficient", "coulomb", "static")
-    )
-    raw = {"coefficient": coefficient, "static_coefficient": onset, "coulomb": preload, "static": breakaway}
-    for one, value in raw.items():
-        if value is not None:
-            e.require(one, value, NOT_NEGATIVE, "must be 0 or greater")
+    raw = [e[one] for one in ("coefficient", "static_coefficient", "coulomb", "static")]
+    coefficient, onset, preload, breakaway = raw
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
         message = "is missing" if "stribeck" not in e.values else "is given without static_coefficient or static"
         remedy = "give stribeck together with static_coefficient or static, or none of them"
@@ -523,42 +523,28 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if result is None or path is None or coefficient is None:
         return None
     if result.joint is None:
-        e.fault(
-            "joint",
-            f"{result.name!r} is not a coordinate of a joint, so it has no reaction",
-            "give coulomb",
-            "EG-REFERENCE",
-        )
+        message = f"{result.name!r} is not a coordinate of a joint, so it has no reaction"
+        e.fault("joint", message, "give coulomb", "EG-REFERENCE")
         return None
     turns = result.kind == "angle"
     if turns and "radius" not in e.values:
-        e.fault(
-            "radius", f"is missing, and {result.name!r} is an angle", "give the radius of the pin (m)", "EG-MISSING"
-        )
+        message = f"is missing, and {result.name!r} is an angle"
+        e.fault("radius", message, "give the radius of the pin (m)", "EG-MISSING")
         return None
     for one in ("radius", "thrust_radius"):
         if one in e.values and not turns:
             e.fault(one, f"has no meaning: {result.name!r} is a length", f"leave {one} out")
             return None
-    smoothing = e.positive("smoothing")
-    stribeck = e.positive("stribeck") if "stribeck" in e.values else None
-    zero = e.graph.zero
+    smoothing, stribeck, zero = e["smoothing"], e["stribeck"], e.graph.zero
     preload, along = (zero if x is None else x for x in (preload, viscous))
-    return ReactionFriction(
-        e.name,
-        path,
-        Friction(preload, smoothing, along, breakaway, None if breakaway is None else stribeck),
-        result.joint,
-        Friction(coefficient, smoothing, zero, onset, None if onset is None else stribeck),
-        e.positive("radius") if "radius" in e.values else None,
-        e.positive("thrust_radius") if "thrust_radius" in e.values else None,
-    )
+    law = Friction(preload, smoothing, along, breakaway, None if breakaway is None else stribeck)
+    by_load = Friction(coefficient, smoothing, zero, onset, None if onset is None else stribeck)
+    return ReactionFriction(e.name, path, law, result.joint, by_load, e["radius"], e["thrust_radius"])
 
 
 # -- friction of a joint -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class JointFriction(PathForce):
     """Friction on a joint's coordinate of rate v (N or N m), such as -[c(v) tanh(v / smoothing) + viscous v].
 
@@ -630,16 +616,22 @@ TYPES = table(
             "viscous": Scalar(
                 "viscous coefficient (N m s/rad or N s/m)", level=LAW, dimension=DAMPING, allowed=NOT_NEGATIVE
             ),
-            "coulomb": Scalar("Coulomb friction (N m or N)", level=LAW, dimension=PUSH),
+            "coulomb": Scalar("Coulomb friction (N m or N)", level=LAW, dimension=PUSH, allowed=NOT_NEGATIVE),
             "static": Scalar(
-                "static friction, at the onset of sliding (N m or N); give stribeck too", level=LAW, dimension=PUSH
+                "static friction, at the onset of sliding (N m or N); give stribeck too",
+                level=LAW,
+                dimension=PUSH,
+                allowed=NOT_NEGATIVE,
             ),
             **BY_REACTION,
             "stribeck": Scalar(
                 "Stribeck velocity (rad/s or m/s): where static friction has largely dropped to Coulomb friction",
                 dimension=RATE,
+                allowed=POSITIVE,
             ),
-            "smoothing": Scalar("velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE),
+            "smoothing": Scalar(
+                "velocity below which Coulomb friction is smoothed (rad/s or m/s)", dimension=RATE, allowed=POSITIVE
+            ),
             "friction_law": Choice(
                 "law of friction: coulomb, the default, smoothed and with the Stribeck effect if wanted; brown_mcphee; "
                 "lugre, bristles that hold a body at rest",

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...base.value_rules import Allowed
+from ...base.value_rules import POSITIVE, Allowed
 from ...expr.core import Expr, sin, sqrt
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ..dimensions import FORCE, LENGTH, NONE, SPEED, TIME
-from ..element_type import ElementType, Entry, table
+from ..element_type import Entry, element, key, table
 from ..kinds import LAW, Scalar
 from ..looks import Seen
 from .force import View
-from .paths import BETWEEN, VIA, PathForce, read_path
+from .paths import LINE, Path, PathForce, read_path
 
 # Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
 # problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement,
@@ -46,8 +46,7 @@ def force_velocity(velocity: Expr) -> Expr:
     return d1 * velocity.graph.apply("log", y + sqrt(y * y + 1.0)) + d4
 
 
-@dataclass(frozen=True)
-class Activation:
+class Activation(Record):
     """How the activation a follows the excitation e (De Groote and others, 2016, eq. 1 and 2).
 
     a' = [(h + 1/2) / (t_a (1/2 + 3 a / 2)) + (1/2 - h) (1/2 + 3 a / 2) / t_d] (e - a),  h = tanh(10 (e - a)) / 2
@@ -64,7 +63,6 @@ class Activation:
         return ((0.5 + h) / (self.activation_time * slow) + slow * (0.5 - h) / self.deactivation_time) * apart
 
 
-@dataclass(frozen=True)
 class Muscle(PathForce):
     """A muscle and its rigid tendon, pulling the ends of its path together.
 
@@ -81,14 +79,31 @@ class Muscle(PathForce):
     )
     formula = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
     uses_value = True
-    activation: Expr
-    force_max: Expr
-    fiber_length: Expr
-    slack_length: Expr
-    velocity_max: Expr
-    pennation: Expr
-    damping: Expr
-    drive: Activation | None = None  #: of a muscle whose activation is a state of its own
+    drive: Activation | None  #: of a muscle whose activation is a state of its own
+    activation: Expr = key(
+        Scalar(
+            "activation of the muscle, 0 to 1", level=LAW, dimension=NONE,
+            allowed=Allowed(0.0, 1.0), remedy="an activation is 0 to 1",
+        )
+    )  # fmt: skip
+    force_max: Expr = key(Scalar("largest active force (N)", required=True, dimension=FORCE, allowed=POSITIVE))
+    fiber_length: Expr = key(
+        Scalar("optimal length of the fibres (m)", required=True, dimension=LENGTH, allowed=POSITIVE)
+    )
+    slack_length: Expr = key(Scalar("length of the tendon (m)", required=True, dimension=LENGTH, allowed=POSITIVE))
+    velocity_max: Expr = key(
+        Scalar(
+            "largest shortening velocity of the fibres (m/s); 10 fiber_length per second by default",
+            dimension=SPEED, allowed=POSITIVE,
+        )
+    )  # fmt: skip
+    pennation: Expr = key(
+        Scalar(
+            "angle of the fibres to the tendon at their optimal length (rad)", default=0, dimension=NONE,
+            allowed=Allowed(-1.5707, 1.5707, above=True, below=True), remedy="must be less than pi/2",
+        )
+    )  # fmt: skip
+    damping: Expr = key(Scalar("damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE))
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         return () if self.drive is None else (self.drive.rate(self.activation),)
@@ -117,25 +132,21 @@ class Muscle(PathForce):
 SHORTENING = 10.0
 
 
-def _muscle(e: Entry) -> Muscle | None:
+def _driven(e: Entry) -> tuple[Path, Activation | None] | None:
     path, drive = read_path(e), None
     if "excitation" in e.values:
-        activation = e.states()[0]
-        drive = Activation(e["excitation"], e.positive("activation_time"), e.positive("deactivation_time"))
-        e.require("excitation", drive.excitation, Allowed(0.0, 1.0), "an excitation is 0 to 1")
+        drive = Activation(*(e[one] for one in ("excitation", "activation_time", "deactivation_time")))
     else:
-        activation = e["activation"]
-        e.require("activation", activation, Allowed(0.0, 1.0), "an activation is 0 to 1")
-        for key in ("activation_time", "deactivation_time"):
-            e.refuse(key, "has a meaning beside excitation only")
-    force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
-    velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else SHORTENING * fiber_length
-    pennation, damping = e["pennation"], e["damping"]
-    e.require("pennation", pennation, Allowed(-1.5707, 1.5707, above=True, below=True), "must be less than pi/2")
-    if path is None:
-        return None
-    sizes = (force_max, fiber_length, slack_length, velocity_max, pennation, damping)
-    return Muscle(e.name, path, activation, *sizes, drive)
+        for one in ("activation_time", "deactivation_time"):
+            e.refuse(one, "has a meaning beside excitation only")
+    return None if path is None else (path, drive)
+
+
+def _complete(e: Entry, values: dict[str, Any]) -> None:
+    if "excitation" in e.values:
+        values["activation"] = e.states()[0]
+    if values["velocity_max"] is None:
+        values["velocity_max"] = SHORTENING * values["fiber_length"]
 
 
 def _states(values: Mapping[str, Any]) -> dict[str, str]:
@@ -143,33 +154,25 @@ def _states(values: Mapping[str, Any]) -> dict[str, str]:
 
 
 TYPES = table(
-    ElementType(
+    element(
+        Muscle,
         "muscle",
         "a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion.",
-        {
-            "between": BETWEEN.replace(required=True),
-            "activation": Scalar("activation of the muscle, 0 to 1", level=LAW, dimension=NONE),
-            "force_max": Scalar("largest active force (N)", required=True, dimension=FORCE),
-            "fiber_length": Scalar("optimal length of the fibres (m)", required=True, dimension=LENGTH),
-            "slack_length": Scalar("length of the tendon (m)", required=True, dimension=LENGTH),
-            "velocity_max": Scalar(
-                "largest shortening velocity of the fibres (m/s); 10 fiber_length per second by default",
-                dimension=SPEED,
-            ),
-            "pennation": Scalar(
-                "angle of the fibres to the tendon at their optimal length (rad)", default=0, dimension=NONE
-            ),
-            "damping": Scalar("damping force at velocity_max, divided by force_max", default=0.1, dimension=NONE),
-            "via": VIA,
+        LINE._replace(read=_driven),
+        more={
             "excitation": Scalar(
                 "instead of activation: what a state of the muscle, <name>_activation, follows, 0 to 1",
                 level=LAW,
                 dimension=NONE,
+                allowed=Allowed(0.0, 1.0),
+                remedy="an excitation is 0 to 1",
             ),
-            "activation_time": Scalar("time in which it grows (s)", default=0.015, dimension=TIME),
-            "deactivation_time": Scalar("time in which it dies away (s)", default=0.06, dimension=TIME),
+            "activation_time": Scalar("time in which it grows (s)", default=0.015, dimension=TIME, allowed=POSITIVE),
+            "deactivation_time": Scalar(
+                "time in which it dies away (s)", default=0.06, dimension=TIME, allowed=POSITIVE
+            ),
         },
-        _muscle,
+        check=_complete,
         one_of=("activation", "excitation"),
         states=_states,
     )

@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 from ...base.value_rules import NOT_NEGATIVE, POSITIVE, Allowed
 from ...expr.core import Expr, sqrt
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
-from ..element_type import ElementType, Entry, Law, Types, key, law, table
+from ..element_type import ElementType, Entry, Law, Types, element, key, table
 from ..kinds import EXPONENT, Choice, Fields, Radii, Scalar
 from ..looks import STOP, Seen
 from .force import Load, View, beyond_zero, map_law, where
-from .paths import ON_JOINT, PathForce, read_coordinate
+from .paths import COORDINATE, PathForce
 
 _STIFFNESS = Scalar(
     "stiffness k (N/m**n) in the normal force k d**n max(0, 1 + dissipation d_dot), d the penetration",
@@ -87,8 +87,7 @@ class NormalLaw(ABC):
         return ()
 
 
-@dataclass(frozen=True)
-class HuntCrossley(NormalLaw):
+class HuntCrossley(Record, NormalLaw):
     """k d^n max(0, 1 + lambda d') of the penetration d > 0, else 0 (Hunt and Crossley, 1975).
 
     With n > 1 the force and its slope are continuous at touch-down.  The force ends at 0 where the surfaces part faster
@@ -116,8 +115,7 @@ class HuntCrossley(NormalLaw):
         return beyond_zero(depth, lambda d: self.stiffness * d**power / power)
 
 
-@dataclass(frozen=True)
-class DampedLinear(NormalLaw):
+class DampedLinear(Record, NormalLaw):
     """max(0, k d + c d') of the penetration d > 0, else 0.
 
     With damping the force begins with a jump to c d'; it ends at 0 where the surfaces part faster than k d / c.
@@ -138,7 +136,6 @@ class DampedLinear(NormalLaw):
         return beyond_zero(depth, lambda d: 0.5 * self.stiffness * d * d)
 
 
-@dataclass(frozen=True)
 class HertzBodies(HuntCrossley):
     """Hertz's law of two elastic bodies, of an effective radius of 1 m; :meth:`at` gives that of others.
 
@@ -152,8 +149,7 @@ class HertzBodies(HuntCrossley):
         return HuntCrossley(self.stiffness * sqrt(radius()), self.exponent, self.dissipation)
 
 
-@dataclass(frozen=True)
-class PartOfLaw(NormalLaw):
+class PartOfLaw(Record, NormalLaw):
     """A part of another law, less an elastic force that another place of contact has taken over with its energy."""
 
     law: NormalLaw
@@ -170,8 +166,7 @@ class PartOfLaw(NormalLaw):
         return self.share * self.law.energy(depth)
 
 
-@dataclass(frozen=True)
-class PartlyDamped(NormalLaw):
+class PartlyDamped(Record, NormalLaw):
     """Another law with a part of its damping, of 0 to 1."""
 
     law: NormalLaw
@@ -188,8 +183,7 @@ class PartlyDamped(NormalLaw):
         return self.law.energy(depth)
 
 
-@dataclass(frozen=True)
-class UpToDepth(NormalLaw):
+class UpToDepth(Record, NormalLaw):
     """Another law up to a depth; deeper its force and its energy are no numbers, which ends a run by an error."""
 
     law: NormalLaw
@@ -208,20 +202,15 @@ class UpToDepth(NormalLaw):
         return self._known(depth, self.law.energy(depth))
 
 
-@dataclass(frozen=True)
-class RigidLaw(NormalLaw):
+class RigidLaw(Record, NormalLaw):
     """No penetration: the force is what it takes, found by a time-stepping method; elsewhere it is none."""
 
     formula: ClassVar[str] = r"0 \le F_n \perp g \ge 0"
 
-    def force(self, depth: Expr, rate: Expr) -> Expr:
+    def force(self, depth: Expr, rate: Expr | None = None) -> Expr:
         return depth.graph.zero
 
-    def elastic(self, depth: Expr) -> Expr:
-        return depth.graph.zero
-
-    def energy(self, depth: Expr) -> Expr:
-        return depth.graph.zero
+    elastic = energy = force
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -306,16 +295,16 @@ def _hertz_law(elastic: Fields) -> ElementType:
 _BY_MODULI = dict.fromkeys(ELASTIC, "choose the type hertz, or give stiffness instead")
 _REMEDIES = {"damping": "leave it out; the dissipation is damping / stiffness", **_BY_MODULI}
 _LAWS = table(
-    law(
+    element(
         HuntCrossley,
         "hunt_crossley",
         "k d**n max(0, 1 + dissipation d_dot) of the penetration d.",
-        IMPACT,
-        _check_dissipation,
-        _REMEDIES,
+        more=IMPACT,
+        check=_check_dissipation,
+        remedies=_REMEDIES,
     ),
     _hertz_law({}),
-    law(DampedLinear, "linear", "max(0, k d + c d_dot).", remedies=_BY_MODULI),
+    element(DampedLinear, "linear", "max(0, k d + c d_dot).", remedies=_BY_MODULI),
 )
 #: Where radii are known.
 CURVED_LAWS = _LAWS | table(_hertz_law(ELASTIC))
@@ -333,7 +322,6 @@ NORMAL = normal_key(_LAWS)
 # -- stops of a joint --------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class JointStop(PathForce):
     """Stops of a joint's coordinate q: beyond ``lower`` or ``upper`` a one-sided force pushes it back (N or N m).
 
@@ -342,9 +330,9 @@ class JointStop(PathForce):
 
     sentence = "Stops of a joint: beyond its limits a force from the penetration $d$ pushes the coordinate back."
     uses_value = True
-    lower: Expr | None
-    upper: Expr | None
-    law: NormalLaw
+    law: NormalLaw = key(NORMAL)
+    lower: Expr | None = key(Scalar("lower limit (rad or m)", dimension=REACH))
+    upper: Expr | None = key(Scalar("upper limit (rad or m)", dimension=REACH))
 
     @property
     def laws(self) -> tuple[NormalLaw, ...]:
@@ -359,49 +347,44 @@ class JointStop(PathForce):
             result.append((value - self.upper, rate, -1.0))
         return result
 
-    def along(self, value: Expr, rate: Expr) -> Expr:
+    def _sum(self, value: Expr, rate: Expr, part: Callable[[Expr, Expr, float], Expr]) -> Expr:
+        """A part of what the law gives, of both stops."""
         total = value.graph.zero
-        for depth, change, sense in self._depths(value, rate):
-            total = total + sense * self.law.force(depth, change)
+        for one in self._depths(value, rate):
+            total = total + part(*one)
         return total
+
+    def along(self, value: Expr, rate: Expr) -> Expr:
+        return self._sum(value, rate, lambda depth, change, sense: sense * self.law.force(depth, change))
 
     def drawn(self) -> list[Seen]:
         ends = tuple(x for x in (self.lower, self.upper) if x is not None)
         return [self.path.drawn((), STOP)._replace(walls=ends)]
 
     def potential(self, view: View) -> Expr | None:
-        total = view.graph.zero
-        for depth, _, _ in self._depths(*self.path.measure(view)):
-            total = total + self.law.energy(depth)
-        return total
+        return self._sum(*self.path.measure(view), lambda depth, change, sense: self.law.energy(depth))
 
     def remainder(self, view: View) -> list[Load]:
-        total = view.graph.zero
-        for depth, rate, sense in self._depths(*self.path.measure(view)):
-            total = total + sense * (self.law.force(depth, rate) - self.law.elastic(depth))
-        return self.path.loads(view, total)
+        def beyond(depth: Expr, change: Expr, sense: float) -> Expr:
+            return sense * (self.law.force(depth, change) - self.law.elastic(depth))
+
+        return self.path.loads(view, self._sum(*self.path.measure(view), beyond))
 
 
-def _stop(e: Entry) -> JointStop | None:
-    path, law = read_coordinate(e), e.read_part("law")
-    lower, upper = e["lower"], e["upper"]
+def _check_limits(e: Entry, values: dict[str, Any]) -> None:
+    lower, upper = values["lower"], values["upper"]
     if lower is None and upper is None:
         e.fault("", "has no limit", "give lower, upper or both", "EG-MISSING")
     if lower is not None and upper is not None:
         e.require("upper", upper - lower, POSITIVE, "this is upper - lower; lower must be less than upper")
-    return None if path is None or law is None else JointStop(e.name, path, lower, upper, law)
 
 
 TYPES = table(
-    ElementType(
+    element(
+        JointStop,
         "stop",
         "elastic stops of a joint's coordinate: below ``lower``, above ``upper`` or both.",
-        {
-            "joint": ON_JOINT.replace(required=True),
-            "law": NORMAL,
-            "lower": Scalar("lower limit (rad or m)", dimension=REACH),
-            "upper": Scalar("upper limit (rad or m)", dimension=REACH),
-        },
-        _stop,
+        COORDINATE,
+        check=_check_limits,
     )
 )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...expr import vectors as vec
 from ...expr.core import Expr, atan2, sqrt
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...expr.vectors import Vec3
 from ..element_type import Entry, Where
 from ..frames import Marker, WrapCylinder
@@ -24,8 +24,7 @@ ON_JOINT = JointReference("a joint of one degree, or a coordinate")
 BETWEEN = Pair("two markers")
 
 
-@dataclass(frozen=True)
-class Path(ABC):
+class Path(Record, ABC):
     """A scalar measure of the configuration."""
 
     @abstractmethod
@@ -45,7 +44,6 @@ class Path(ABC):
         """Loads equivalent to a generalized force along increasing value: their power is force times rate."""
 
 
-@dataclass(frozen=True)
 class Line(Path):
     """The distance between the origins of two markers (m)."""
 
@@ -79,7 +77,6 @@ class Line(Path):
         return [MarkerLoad(self.end, push, o), MarkerLoad(self.start, vec.neg(push), o)]
 
 
-@dataclass(frozen=True)
 class Turn(Path):
     """The angle by which the end marker is turned about the z axis of the start marker (rad).
 
@@ -106,7 +103,6 @@ class Turn(Path):
         return [MarkerLoad(self.end, o, torque), MarkerLoad(self.start, o, vec.neg(torque))]
 
 
-@dataclass(frozen=True)
 class JointCoordinate(Path):
     """One coordinate of a joint (rad or m)."""
 
@@ -150,7 +146,6 @@ COORDINATE = Where({"joint": ON_JOINT.replace(required=True)}, read_coordinate)
 ANGLE = Where({"joint": ON_JOINT, "between": BETWEEN}, read_angle, one_of=("joint", "between"))
 
 
-@dataclass(frozen=True)
 class PathForce(Force):
     """A force along a path: :meth:`along` says how large it is at a value and a rate of the path."""
 
@@ -185,7 +180,6 @@ class Piece(NamedTuple):
     bend: Expr
 
 
-@dataclass(frozen=True)
 class Route(Path):
     """A taut string from one marker to another over via points, which it slides through, and around cylinders (m).
 

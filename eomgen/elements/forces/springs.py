@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import combinations
+from typing import Any
 
-from ...base.value_rules import Allowed
+from ...base.value_rules import POSITIVE, Allowed
 from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt, substitute
 from ...expr.differentiate import gradient
-from ...expr.records import dataclass
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, ENERGY, FORCE, LENGTH, NONE, PUSH, RATE, REACH, SPIN, STIFFNESS, TIME, Dimension
 from ..element_type import ElementType, Entry, Where, element, key, keys_of, table
@@ -48,7 +48,6 @@ from .paths import (
 )
 
 
-@dataclass(frozen=True)
 class Actuator(PathForce):
     """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
 
@@ -78,7 +77,6 @@ def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
 _AXES = Choice("axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
 
 
-@dataclass(frozen=True)
 class PointForce(Force):
     """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
 
@@ -96,7 +94,6 @@ class PointForce(Force):
         return [Pull(self.marker, self.value, self.axes == "body", turns=False)]
 
 
-@dataclass(frozen=True)
 class BodyTorque(Force):
     """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
 
@@ -162,7 +159,6 @@ TYPES = table(
 # -- springs and dampers -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Spring(PathForce):
     """Linear spring: generalized force -k (s - s0) along the path (k in N/m or N m/rad).
 
@@ -201,7 +197,6 @@ class Spring(PathForce):
         return 0.5 * self.stiffness * (stretch * stretch)
 
 
-@dataclass(frozen=True)
 class Damper(PathForce):
     """Viscous damper: generalized force -c s' along the path (c in N s/m or N m s/rad)."""
 
@@ -257,7 +252,6 @@ TYPES |= table(
 # -- any law: an expression of a path's value and rate -----------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class GeneralElement(PathForce):
     """A generalized force law(value, rate) - dV/dvalue along the path (N or N m).
 
@@ -362,7 +356,6 @@ Row6 = tuple[Expr, Expr, Expr, Expr, Expr, Expr]
 Mat6 = tuple[Row6, Row6, Row6, Row6, Row6, Row6]
 
 
-@dataclass(frozen=True)
 class Bushing(Force):
     """Forces -K y - C y' of the displacements y = [d; theta] of marker ``second`` from marker ``first``.
 
@@ -469,8 +462,8 @@ def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
     return [dot(row, y) for row in m]
 
 
-def _check_symmetry(e: Entry) -> None:
-    stiffness: Mat6 | None = e["stiffness"]
+def _check_symmetry(e: Entry, values: dict[str, Any]) -> None:
+    stiffness: Mat6 | None = values["stiffness"]
     if stiffness is None:
         return
     for i, j in combinations(range(6), 2):
@@ -496,7 +489,6 @@ TYPES |= table(
 # -- gravity of a point mass: Newton's law, and MacCullagh's for a body of some extent ---------------------------------
 
 
-@dataclass(frozen=True)
 class PointGravity(Force):
     """Attraction of a body to a point at the marker ``center``, of gravitational parameter mu = G M (m^3/s^2).
 
@@ -557,7 +549,7 @@ class PointGravity(Force):
 
 def _point_gravity(e: Entry) -> PointGravity | None:
     center = e["center"]
-    mu, extent, result = e.positive("mu"), e["extent"], e["body"]
+    mu, extent, result = e["mu"], e["extent"], e["body"]
     if result is None:
         return None
     index, body = result
@@ -576,7 +568,10 @@ TYPES |= table(
             "center": MarkerReference("marker at the attracting point", required=True),
             "body": BodyName("the body that is attracted at its centre of mass", required=True),
             "mu": Scalar(
-                "gravitational parameter G M of the centre (m^3/s^2)", required=True, dimension=Dimension(3, 0, -2)
+                "gravitational parameter G M of the centre (m^3/s^2)",
+                required=True,
+                dimension=Dimension(3, 0, -2),
+                allowed=POSITIVE,
             ),
             "extent": Choice(
                 "point takes the body as a point mass; maccullagh adds its inertia to second order: the "

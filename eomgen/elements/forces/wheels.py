@@ -11,10 +11,10 @@ from ...base.limits.numbers import NO_SLIP
 from ...base.value_rules import NOT_NEGATIVE, POSITIVE
 from ...expr import vectors as vec
 from ...expr.core import Expr, sqrt
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...expr.vectors import Vec3
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
-from ..element_type import ElementType, Entry, Where, element, key, keys_of, table
+from ..element_type import Entry, Where, element, key, keys_of, table
 from ..frames import Marker, velocity_at
 from ..kinds import LAW, Axis, Choice, Flag, Pair, Radii, Scalar
 from ..looks import PLANE, Drawn, Seen, Wheel
@@ -25,7 +25,6 @@ LAWS = ("linear", "vermeulen_johnson", "polach")
 _FACTOR = Scalar("", level=LAW, dimension=FORCE)
 
 
-@dataclass(frozen=True)
 class Creep(Force):
     """Forces by which a rolling wheel creeps on its track, from the velocity of the wheel where it touches.
 
@@ -118,8 +117,8 @@ class Creep(Force):
         ]
 
 
-def _check_saturation(e: Entry) -> None:
-    law = e["creep_law"]
+def _check_saturation(e: Entry, values: dict[str, Any]) -> None:
+    law = values["law"]
     for needed in ("normal", "friction"):
         if law == "linear":
             e.refuse(needed, "the linear law does not saturate")
@@ -178,7 +177,7 @@ class TyreForces(NamedTuple):
     drag: Expr  #: along the wheel as well, of rolling resistance: without a moment about the axle (N)
 
 
-class TyreLaw(ABC):
+class TyreLaw(Record, ABC):
     """Forces of a tyre; ``formula`` says them in LaTeX."""
 
     formula: ClassVar[str]
@@ -199,7 +198,6 @@ class TyreLaw(ABC):
         return None
 
 
-@dataclass(frozen=True)
 class Brush(TyreLaw):
     """The brush model of one stiffness in all directions.
 
@@ -281,7 +279,6 @@ SHIFTS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
 class MagicFormula(TyreLaw):
     """The Magic Formula in its version of 2002, forces of combined slip with camber, without moments.
 
@@ -373,7 +370,6 @@ class _WheelMotion(NamedTuple):
     sideways: Expr  #: V_sy
 
 
-@dataclass(frozen=True)
 class Tyre(Force):
     """A tyre of a thin wheel on a plane road.
 
@@ -406,15 +402,45 @@ class Tyre(Force):
     )
     road: Marker
     wheel: Marker
-    axis: Vec3  #: in the wheel's axes
-    radius: Expr
-    rolling_radius: Expr
-    load_law: DampedLinear
-    law: TyreLaw
-    relaxation: tuple[Expr, Expr]
-    settling: Expr
-    reversal: Expr
-    deflections: tuple[Expr, Expr]
+    radius: Expr = key(Scalar("radius without load (m)", required=True, dimension=LENGTH, allowed=POSITIVE))
+    stiffness: Expr = key(Scalar("radial stiffness (N/m)", required=True, dimension=STIFFNESS, allowed=POSITIVE))
+    relaxation: tuple[Expr, Expr] = key(
+        Radii(
+            "relaxation lengths along and across the wheel (m)",
+            required=True,
+            dimension=LENGTH,
+            allowed=POSITIVE,
+        )
+    )
+    damping: Expr = key(Scalar("radial damping (N s/m)", default=0, dimension=DAMPING, allowed=NOT_NEGATIVE))
+    settling: Expr = key(
+        Scalar(
+            "time (s) that damps the deflections at rest; steady slips do not depend on it",
+            default=0, dimension=TIME, allowed=NOT_NEGATIVE,
+        )
+    )  # fmt: skip
+    reversal: Expr = key(
+        Scalar(
+            "velocity (m/s) around 0 over which rolling forwards becomes rolling backwards",
+            default=0.1, dimension=SPEED, allowed=POSITIVE,
+        )
+    )  # fmt: skip
+    axis: Vec3 = key(Axis("axis of the wheel to its left, in its marker", default="y"))
+    rolling_radius: Expr = key(
+        Scalar("effective rolling radius (m), the radius unless given", dimension=LENGTH, allowed=POSITIVE)
+    )
+    law: TyreLaw = key(
+        Choice(
+            "law of the forces: brush; magic_formula, of the car tyre 205/60R15 91V of Pacejka (2006)",
+            default=TYRE_LAWS[0], choices=TYRE_LAWS,
+        )
+    )  # fmt: skip
+    deflections: tuple[Expr, ...] = ()
+
+    @property
+    def load_law(self) -> DampedLinear:
+        """The normal force."""
+        return DampedLinear(self.stiffness, self.damping)
 
     @property
     def laws(self) -> tuple[Any, ...]:
@@ -551,77 +577,52 @@ class Tyre(Force):
 
 
 # -- reading ----------------------------------------------------------------------------------------------------------
-def _tyre(e: Entry) -> Tyre | None:
-    pair, axis, radius = e.pair(), e["axis"], e.positive("radius")
-    rolling = e.positive("rolling_radius") if "rolling_radius" in e.values else radius
-    damping, settling, relaxation = e["damping"], e["settling"], e["relaxation"]
-    reversal = e.positive("reversal")
-    e.require("settling", settling, NOT_NEGATIVE, "must be 0 or greater")
-    e.require("damping", damping, NOT_NEGATIVE, "must be 0 or greater")
-    for k, length in enumerate(relaxation or ()):
-        e.require(f"relaxation[{k}]", length, POSITIVE, "must be greater than 0")
-    law, load_law = _law(e), DampedLinear(e.positive("stiffness"), damping)
-    if pair is None or law is None or relaxation is None or e.at_fault():
-        return None
-    u, v = e.states()
-    lengths = (relaxation[0], relaxation[1])
-    return Tyre(e.name, *pair, axis, radius, rolling, load_law, law, lengths, settling, reversal, (u, v))
+
+
+def _check_tyre(e: Entry, values: dict[str, Any]) -> None:
+    values["law"], values["deflections"] = _law(e), e.states()
+    if values["rolling_radius"] is None:
+        values["rolling_radius"] = values["radius"]
 
 
 def _law(e: Entry) -> TyreLaw | None:
-    kind = e["law"]
-    if kind == "brush":
+    slip_stiffness, friction, half = (e[key] for key in ("slip_stiffness", "friction", "half_length"))
+    if e["law"] == "brush":
         e.refuse("shifts", "belongs to law: magic_formula")
         for key in ("slip_stiffness", "friction"):
             if key not in e.values:
                 e.missing(key, "law: brush needs slip_stiffness and friction")
-        if e.at_fault():
-            return None
-        half = e.positive("half_length") if "half_length" in e.values else None
-        return Brush(e.positive("slip_stiffness"), e.positive("friction"), half)
+        return Brush(slip_stiffness, friction, half)
     for key in ("slip_stiffness", "half_length"):
         e.refuse(key, "belongs to law: brush")
-    friction = e.positive("friction") if "friction" in e.values else e.graph.one
-    return MagicFormula(e["shifts"], friction)
+    return MagicFormula(e["shifts"], e.graph.one if friction is None else friction)
 
 
 TYPES |= table(
-    ElementType(
+    element(
+        Tyre,
         "tyre",
         "a tyre on a plane road: the first marker is the road (z out of it), the second the centre of the wheel.",
-        {
-            "between": Pair("the road and the wheel's centre", required=True),
-            "radius": Scalar("radius without load (m)", required=True, dimension=LENGTH),
-            "stiffness": Scalar("radial stiffness (N/m)", required=True, dimension=STIFFNESS),
-            "relaxation": Radii("relaxation lengths along and across the wheel (m)", required=True, dimension=LENGTH
+        Where({"between": Pair("the road and the wheel's centre", required=True)}, Entry.pair),
+        more={
+            "slip_stiffness": Scalar(
+                "force of the brush per slip (N), along and across", level=LAW, dimension=FORCE, allowed=POSITIVE
             ),
-            "damping": Scalar("radial damping (N s/m)", default=0, dimension=DAMPING),
-            "settling": Scalar("time (s) that damps the deflections at rest; steady slips do not depend on it",
-                default=0, dimension=TIME,
+            "friction": Scalar(
+                "friction coefficient of the brush, or factor of the peaks of the Magic Formula",
+                level=LAW,
+                dimension=NONE,
+                allowed=POSITIVE,
             ),
-            "reversal": Scalar("velocity (m/s) around 0 over which rolling forwards becomes rolling backwards",
-                default=0.1, dimension=SPEED,
-            ),
-            "axis": Axis("axis of the wheel to its left, in its marker", default="y"),
-            "rolling_radius": Scalar("effective rolling radius (m), the radius unless given", dimension=LENGTH
-            ),
-            "law": Choice("law of the forces: brush; magic_formula, of the car tyre 205/60R15 91V of Pacejka (2006)",
-                default=TYRE_LAWS[0],
-                choices=TYRE_LAWS,
-            ),
-            "slip_stiffness": Scalar("force of the brush per slip (N), along and across", level=LAW, dimension=FORCE
-            ),
-            "friction": Scalar("friction coefficient of the brush, or factor of the peaks of the Magic Formula",
-                level=LAW, dimension=NONE,
-            ),
-            "half_length": Scalar("half of the length of contact (m) of the brush, for its aligning moment",
+            "half_length": Scalar(
+                "half of the length of contact (m) of the brush, for its aligning moment",
                 dimension=LENGTH,
+                allowed=POSITIVE,
             ),
-            "shifts": Flag("whether the Magic Formula has its forces at no slip (conicity, ply steer)", default=True
-            ),
+            "shifts": Flag("whether the Magic Formula has its forces at no slip (conicity, ply steer)", default=True),
         },
-        _tyre,
+        check=_check_tyre,
         states=lambda values: {"deflection_x": "m", "deflection_y": "m"},
         ends=("road", "wheel"),
     )
-)  # fmt: skip
+)
