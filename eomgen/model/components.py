@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 from ..elements import kinds
 from ..elements.joints import JOINTS
@@ -33,8 +34,23 @@ from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started,
 #: Notes a fault: path, message, remedy, code.
 Fault = Callable[[str, str, str, str], None]
 
+Result = TypeVar("Result")
 #: Words of expressions that no model declares.
 WORDS = frozenset(("t", "pi", "and", "or", "not", "if", "else", *ENERGIES, *TOTALS, *QUANTITIES, *callable_names()))
+
+
+class Refused(Exception):
+    """What cannot be added: path, message, remedy, code; nothing where that is noted already."""
+
+
+def attempt(fault: Fault, call: Callable[..., Result], *arguments: Any) -> Result | None:
+    """The result of a call; None, and a fault, where it is refused."""
+    try:
+        return call(*arguments)
+    except Refused as refused:
+        if refused.args:
+            fault(*refused.args)
+        return None
 
 
 def is_constant(value: Any) -> bool:
@@ -43,31 +59,42 @@ def is_constant(value: Any) -> bool:
 
 
 # -- the names of a component ------------------------------------------------------------------------------------------
-class DeclaredNames:
-    """Names that a description declares: symbols of expressions, bodies, joints and constraints."""
+@dataclass
+class Component:
+    """A part of a mechanism that models take in, as often as they like."""
 
-    def __init__(self, description: Description) -> None:
-        sections = description.sections
+    name: str  #: in messages
+    place: str  #: dotted path of its entries in messages
+    description: Description  #: its entries, values numbers and texts; instances in it are expanded
+    attachments: tuple[str, ...] = ()  #: names that stand for markers of the model
+    closed: bool = True  #: whether it knows no names but its own: it has a file of its own, or is a Model
 
-        def named(*places: str) -> set[str]:
-            return {entry.name for place in places for entry in sections[place] if isinstance(entry.name, str)}
-
-        self.bodies = named("bodies") - {GROUND_NAME}
-        self.elements = named("joints", "constraints")
-        self.symbols = named("parameters", "inputs", "functions", "states", "outputs", "events")
+    def __post_init__(self) -> None:
+        """Collect the names that it declares: bodies, joints and constraints, symbols of expressions."""
+        sections = self.description.sections
+        named = {place: {e.name for e in entries if isinstance(e.name, str)} for place, entries in sections.items()}
+        self.size = size_of(self.description) + 1
+        self.given = {e.name: e for place in ("parameters", "inputs") for e in sections[place]}
+        self.bodies, self.elements = named["bodies"] - {GROUND_NAME}, named["joints"] | named["constraints"]
         faults = Faults(Description())  # told where the model is checked
-        reader = Reader(Graph(), Namespace(faults), faults, description)
+        reader = Reader(Graph(), Namespace(faults), faults, self.description)
         declare_coordinates(reader, sections["joints"])
         declare_contacts(reader, sections["constraints"])
         declare_states(reader, sections["states"], False)
         element_states(reader, sections["forces"])
         declare_switches(reader, [*sections["constraints"], *sections["joints"]])
-        unknown = [entry for entry in sections["joints"] if str(entry.values.get("type")) not in JOINTS]
-        self.symbols |= {str(entry.name) for entry in unknown} | {*reader.names.kinds} - {"t"}
+        self.symbols = {str(e.name) for e in sections["joints"] if str(e.values.get("type")) not in JOINTS}
+        self.symbols |= {*reader.names.kinds} - {"t"}
+        for place in ("parameters", "inputs", "functions", "states", "outputs", "events"):
+            self.symbols |= named[place]
 
     def has_symbol(self, name: str) -> bool:
         """Whether a name, or the quantity whose rate it is, is declared."""
         return any(name.endswith(rate) and name[: len(name) - len(rate)] in self.symbols for rate in RATES)
+
+    def report(self, faults: Faults, place: str, message: str, remedy: str, code: str) -> None:
+        """Note a fault of the component itself."""
+        faults.take(Problem(f"{self.place}{place}", message, remedy, *self.description.place(place), code))
 
 
 class Attached(NamedTuple):
@@ -82,21 +109,19 @@ class Renaming(Visitor):
     """A component's names as an instance has them, its attachments the markers given, its parameters put in.
 
     ``prefix`` is put before every name of the component; ``values`` are expressions of the model in the place of
-    parameters and inputs, ``attached`` markers by attachment, ground among them.  A ``closed`` component knows no names
-    but its own; ``fault`` notes those that it does not declare.
+    parameters and inputs, ``attached`` markers by attachment, ground among them.  ``fault`` notes names that the
+    component does not declare.
     """
 
     def __init__(
         self,
-        own: DeclaredNames,
+        own: Component,
         prefix: str,
         values: Mapping[str, str],
         attached: Mapping[str, Attached],
-        closed: bool,
         fault: Fault | None = None,
     ) -> None:
-        self.own, self.prefix, self.values, self.attached = own, prefix, values, attached
-        self.closed, self.fault = closed, fault
+        self.own, self.prefix, self.values, self.attached, self.fault = own, prefix, values, attached, fault
         self.markers: dict[str, tuple[str, Mapping[str, Any]]] = {}  #: name -> body and place of markers to add
 
     def word(self, name: str) -> str:
@@ -127,7 +152,7 @@ class Renaming(Visitor):
 
     def coordinate(self, name: str) -> str:
         known = name in self.own.elements or self.own.has_symbol(name)
-        return self.prefix + name if known or self.closed else name
+        return self.prefix + name if known or self.own.closed else name
 
     def latex(self, text: Any) -> Any:
         return with_instance(text, self.prefix.strip("_")) if isinstance(text, str) and text else text
@@ -135,7 +160,7 @@ class Renaming(Visitor):
     def body(self, name: str) -> str:
         if name in self.attached:
             return self.attached[name].body
-        return self.prefix + name if name in self.own.bodies or self.closed else name
+        return self.prefix + name if name in self.own.bodies or self.own.closed else name
 
     def marker(self, reference: Any) -> Any:
         body = reference.get("body") if isinstance(reference, Mapping) else reference
@@ -181,64 +206,31 @@ class Renaming(Visitor):
 VALUE_KEYS = ("value", "unit")
 
 
-class InstanceValue(NamedTuple):
-    """What an instance gives for a parameter or an input."""
-
-    value: Any
-    unit: str | None = None  #: None for that of the component
-
-
-def read_instance_value(entry: DescribedEntry, raw: Any, path: str, fault: Fault) -> InstanceValue | None:
-    """A number or expression as it stands, or the value and unit of a mapping; None if that is at fault.
+def read_instance_value(entry: DescribedEntry, raw: Any, path: str) -> tuple[Any, str | None]:
+    """A number or expression and its unit, None for that of the component.
 
     ``entry`` is the parameter or input of the component, ``raw`` what the instance has for it, at ``path``.
     """
     if not isinstance(raw, Mapping):
-        return InstanceValue(raw)
+        return raw, None
     for key in raw:
         if key not in VALUE_KEYS:
-            fault(f"{path}.{key}", f"no key {key!r}", nearest(str(key), VALUE_KEYS, "keys"), "EG-NAME-UNKNOWN")
-            return None
+            raise Refused(f"{path}.{key}", f"no key {key!r}", nearest(str(key), VALUE_KEYS, "keys"), "EG-NAME-UNKNOWN")
     if raw.get("value") is None:
-        fault(path, f"{dict(raw)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
-        return None
-    unit, own = raw.get("unit"), entry.values.get("unit")
-    if unit is None:
-        return InstanceValue(raw["value"])
+        raise Refused(path, f"{dict(raw)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
+    value, unit, own = raw["value"], raw.get("unit"), entry.values.get("unit")
     try:
-        if not isinstance(unit, str):
+        if unit is not None and not isinstance(unit, str):
             raise UnitError(f"{unit!r} is not a unit", "write a unit as text, as in mm")
-        read = read_unit(unit)
-        if isinstance(own, str) and own and read_unit(own).dimension != read.dimension:
-            message = f"{unit!r} does not measure what {entry.name} is in: {own}"
-            fault(f"{path}.unit", message, "give a unit like that", "EG-UNIT")
-            return None
+        read = read_unit(unit or "")
+        if unit is not None and isinstance(own, str) and own and read_unit(own).dimension != read.dimension:
+            raise UnitError(f"{unit!r} does not measure what {entry.name} is in: {own}", "give a unit like that")
+        if not is_constant(value) and read.size != 1.0:
+            remedy = "leave the unit out: parameters are in SI units, so the expression is too"
+            raise UnitError(f"{str(value)!r} is an expression, and {unit} is not an SI unit", remedy)
     except UnitError as error:
-        fault(f"{path}.unit", str(error), error.remedy, "EG-UNIT")
-        return None
-    if not is_constant(raw["value"]) and read.size != 1.0:
-        remedy = "leave the unit out: parameters are in SI units, so the expression is too"
-        fault(
-            f"{path}.unit", f"{str(raw['value'])!r} is an expression, and {unit} is not an SI unit", remedy, "EG-UNIT"
-        )
-        return None
-    return InstanceValue(raw["value"], unit)
-
-
-@dataclass
-class Component:
-    """A part of a mechanism that models take in, as often as they like."""
-
-    name: str  #: in messages
-    place: str  #: dotted path of its entries in messages
-    description: Description  #: its entries, values numbers and texts; instances in it are expanded
-    attachments: tuple[str, ...] = ()  #: names that stand for markers of the model
-    closed: bool = True  #: whether it knows no names but its own: it has a file of its own, or is a Model
-
-    def __post_init__(self) -> None:
-        self.names = DeclaredNames(self.description)
-        self.size = size_of(self.description) + 1
-        self.given = {e.name: e for s in ("parameters", "inputs") for e in self.description.sections[s]}
+        raise Refused(f"{path}.unit", str(error), error.remedy, "EG-UNIT") from None
+    return value, unit
 
 
 def size_of(description: Description) -> int:
@@ -250,42 +242,36 @@ def size_of(description: Description) -> int:
 class Instance:
     """One use of a component: its name, prefix, attachments by name, and values of parameters and inputs.
 
-    ``places`` tells where in the instance's entry each value stands.
+    Each value has the path at which it stands.
     """
 
     name: str
     prefix: str
     at: Mapping[str, Any] = field(default_factory=dict)
-    values: Mapping[str, Any] = field(default_factory=dict)
-    places: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, tuple[Any, str]] = field(default_factory=dict)
     initial: Mapping[str, Any] = field(default_factory=dict)
     guess: Mapping[str, Any] = field(default_factory=dict)
 
 
 def add_instance(
     target: Description, component: Component, instance: Instance, path: str, faults: Faults, whole: bool = False
-) -> bool:
-    """Add the entries of an instance to a description; False, and faults at ``path``, if that is not possible.
+) -> None:
+    """Add the entries of an instance to a description.
 
-    A wrong marker or value is a fault, and a stand-in takes its place; if ``whole``, the instance is not added then.
+    A wrong marker or value is a fault, and a stand-in takes its place; if ``whole``, the instance is refused then.
     """
-
-    def report(place: str, message: str, remedy: str, code: str) -> None:
-        """A fault of the component itself."""
-        where = component.description.place(place)
-        faults.take(Problem(f"{component.place}{place}", message, remedy, *where, code))
-
     before = len(faults)
     attached = _attachments(target, component, instance, path, faults.add)
-    numbers, texts, units = _values(component, instance, path, faults.add, report)
-    if (whole and len(faults) > before) or not claim(target, instance, path, faults.add):
-        return False
+    numbers, texts, units = _values(component, instance, faults)
+    if whole and len(faults) > before:
+        raise Refused
+    claim(target, instance, path)
     origins = {
         f"{section}.{entry.name}": f"{section}.{instance.prefix}{entry.name}"
         for section, entries in component.description.sections.items()
         for entry in entries
     }
-    renaming = Renaming(component.names, instance.prefix, texts, attached, component.closed)
+    renaming = Renaming(component, instance.prefix, texts, attached)
     _copy_origins(target, component, instance, origins)
 
     def note_attachment(name: str, where: str) -> None:
@@ -322,11 +308,10 @@ def add_instance(
         whole_name, text = f"{instance.name}.{binding.instance}", renaming.scalar(binding.text)
         target.bindings.append(binding._replace(instance=whole_name, text=text))
     for name in texts:
-        if instance.values.get(name) is not None:
-            place = f"{path}.{instance.places.get(name, name)}"
-            target.bindings.append(Binding(place, instance.name, texts[name], component.given[name].values.get("unit")))
+        if instance.values.get(name, (None,))[0] is not None:
+            place, unit = instance.values[name][1], component.given[name].values.get("unit")
+            target.bindings.append(Binding(place, instance.name, texts[name], unit))
             target.origins[place] = Origin(place, "", "")
-    return True
 
 
 def _split(place: str) -> tuple[str, str]:
@@ -347,7 +332,7 @@ def _attachments(
             message = f"{component.name} has no attachment {name!r}"
             fault(f"{path}.at.{name}", message, nearest(str(name), known, "it has"), "EG-NAME-UNKNOWN")
     remedy = "give a body, body.marker, ground or {body, at, rpy}"
-    unknown = [name for name in instance.at if name not in (*known, *component.names.bodies)]
+    unknown = [name for name in instance.at if name not in (*known, *component.bodies)]
     for name in (*known, *unknown):
         attached = _attached(target, instance.at[name]) if name in instance.at else None
         if attached is not None:
@@ -404,30 +389,28 @@ def _attached(target: Description, reference: Any) -> Attached | None:
 
 
 def _values(
-    component: Component, instance: Instance, path: str, fault: Fault, report: Fault
+    component: Component, instance: Instance, faults: Faults
 ) -> tuple[dict[str, Any], dict[str, str], dict[str, str]]:
     """Numbers of parameters and inputs that stay, texts in the place of those that do not; units given with numbers."""
-    for name in instance.values:
+    for name, (_, place) in instance.values.items():
         if name not in component.given:
             remedy = nearest(str(name), component.given, "parameters and inputs")
-            place = instance.places.get(name, name)
-            fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy, "EG-NAME-UNKNOWN")
+            faults.add(place, f"{component.name} has no parameter or input {name!r}", remedy, "EG-NAME-UNKNOWN")
     numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
     for name, entry in component.given.items():
-        read = read_instance_value(entry, instance.values.get(name), f"{path}.{instance.places.get(name, name)}", fault)
-        raw = None if read is None else read.value
-        if read is not None and raw is not None and is_constant(raw):
+        read = attempt(faults.add, read_instance_value, entry, *instance.values.get(name, (None, "")))
+        raw, unit = read or (None, None)
+        if raw is not None and is_constant(raw):
             numbers[name] = raw
-            units |= {} if read.unit is None else {name: read.unit}
+            units |= {} if unit is None else {name: unit}
         elif raw is not None:
             texts[name] = str(raw)
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
             if (own := sound_unit(entry.values.get("unit"))) is not None and own.size != 1.0:
-                place = f"{entry.path}.unit"
                 remedy = "give an SI unit: parameters are in SI units, so the expression is too"
-                report(place, f"{str(value)!r} is an expression, and its unit is not an SI unit", remedy, "EG-UNIT")
-            renaming = Renaming(component.names, instance.prefix, dict(texts), {}, component.closed)
-            texts[name] = str(renaming.scalar(value))
+                message = f"{str(value)!r} is an expression, and its unit is not an SI unit"
+                component.report(faults, f"{entry.path}.unit", message, remedy, "EG-UNIT")
+            texts[name] = str(Renaming(component, instance.prefix, dict(texts), {}).scalar(value))
     return numbers, texts, units
 
 
@@ -493,9 +476,9 @@ def _add_starts(target: Description, component: Component, instance: Instance, r
         made = {inside(name): renaming.scalar(x) for name, x in (own.items() if isinstance(own, Mapping) else ())}
         made |= {inside(name): value for name, value in raw.items()}
         if made:
-            kept = target.values.get(key, {})
+            kept = target.values.get(key)
             whole = {**made, **kept} if isinstance(kept, Mapping) else made
-            if isinstance(kept, dict) and type(kept) is not dict:  # the Settings of a Model
+            if isinstance(kept, dict):  # also the Settings of a Model
                 kept.clear()
                 kept.update(whole)
             else:
@@ -508,56 +491,47 @@ Round = dict[str, Any]
 _LISTS = "give a list of numbers or expressions, a count n for 1 to n, or {from, to, step}"
 
 
-def rounds_of(raw: Any, path: str, fault: Fault) -> list[Round] | None:
-    """The values of all variables in each round; None where something is wrong, which is told."""
+def rounds_of(raw: Any, path: str) -> list[Round]:
+    """The values of all variables in each round."""
     if not isinstance(raw, Mapping) or not raw:
-        fault(path, f"{raw!r} is not a mapping of variables to their values", _LISTS, "EG-TYPE")
-        return None
-    columns: dict[str, list[Any]] = {}
-    for name, values in raw.items():
-        place = f"{path}.{name}"
-        wrong = fault_of_name(name, symbol=True)
-        if wrong:
-            fault(place, *wrong, "EG-NAME-FORM")
-            return None
-        listed = _values_of(values)
-        if listed is None:
-            fault(place, f"{values!r} is not a list of values", _LISTS, "EG-TYPE")
-            return None
-        if not 1 <= len(listed) <= ROUNDS:
-            many, none = ("has more than {} values", "EG-TOO-LARGE"), ("has no values", "EG-SHAPE")
-            wrong_count, code = many if listed else none
-            fault(place, wrong_count.format(ROUNDS), f"1 to {ROUNDS}", code)
-            return None
-        columns[name] = listed
-    counts = {name: len(values) for name, values in columns.items()}
-    if len(set(counts.values())) > 1:
-        shown = ", ".join(f"{name} has {count}" for name, count in counts.items())
+        raise Refused(path, f"{raw!r} is not a mapping of variables to their values", _LISTS, "EG-TYPE")
+    columns = {name: _values_of(name, values, f"{path}.{name}") for name, values in raw.items()}
+    if len({len(values) for values in columns.values()}) > 1:
+        shown = ", ".join(f"{name} has {len(values)}" for name, values in columns.items())
         remedy = "all lists must have the same length: the variables take their values side by side"
-        fault(path, f"lists of different lengths: {shown}", remedy, "EG-SHAPE")
-        return None
+        raise Refused(path, f"lists of different lengths: {shown}", remedy, "EG-SHAPE")
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _values_of(name: Any, raw: Any, path: str) -> list[Any]:
+    """The values of a variable."""
+    if wrong := fault_of_name(name, symbol=True):
+        raise Refused(path, *wrong, "EG-NAME-FORM")
+    listed = _counted(raw) if isinstance(raw, Mapping) else items(raw)
+    if isinstance(raw, int) and not isinstance(raw, bool):
+        listed = list(range(1, min(raw, ROUNDS + 1) + 1))
+    if listed is None or not all(isinstance(x, str) or _is_number(x) for x in listed):
+        raise Refused(path, f"{raw!r} is not a list of values", _LISTS, "EG-TYPE")
+    if not 1 <= len(listed) <= ROUNDS:
+        many, none = (f"has more than {ROUNDS} values", "EG-TOO-LARGE"), ("has no values", "EG-SHAPE")
+        message, code = many if listed else none
+        raise Refused(path, message, f"1 to {ROUNDS}", code)
+    return listed
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _values_of(values: Any) -> list[Any] | None:
-    if isinstance(values, int) and not isinstance(values, bool):
-        return list(range(1, min(values, ROUNDS + 1) + 1))
-    if isinstance(values, Mapping):
-        first, last, step = (values.get(key, default) for key, default in (("from", 1), ("to", None), ("step", 1)))
-        if not {*values} <= {"from", "to", "step"} or not all(map(_is_number, (first, last, step))) or step == 0:
-            return None
-        begin, end, by = (Decimal(repr(x)) for x in (first, last, step))  # as written, so that the end counts
-        count = math.floor((end - begin) / by) + 1
-        whole = all(isinstance(x, int) for x in (first, step))
-        return [(int if whole else float)(begin + k * by) for k in range(max(0, min(count, ROUNDS + 1)))]
-    listed = items(values)
-    if listed is None or not all(isinstance(x, str) or _is_number(x) for x in listed):
+def _counted(raw: Mapping[str, Any]) -> list[Any] | None:
+    """The numbers of ``{from, to, step}``; None if it is none."""
+    first, last, step = (raw.get(key, default) for key, default in (("from", 1), ("to", None), ("step", 1)))
+    if not {*raw} <= {"from", "to", "step"} or not all(map(_is_number, (first, last, step))) or step == 0:
         return None
-    return listed
+    begin, end, by = (Decimal(repr(x)) for x in (first, last, step))  # as written, so that the end counts
+    count = math.floor((end - begin) / by) + 1
+    whole = all(isinstance(x, int) for x in (first, step))
+    return [(int if whole else float)(begin + k * by) for k in range(max(0, min(count, ROUNDS + 1)))]
 
 
 def put_in(value: Any, variables: Round) -> Any:
@@ -565,19 +539,10 @@ def put_in(value: Any, variables: Round) -> Any:
     if isinstance(value, str):
         if value.strip() in variables:
             return variables[value.strip()]
-        return rewritten(value, lambda name: _text_of(name, variables))
+        return rewritten(value, lambda name: in_brackets(str(variables[name])) if name in variables else name)
     if isinstance(value, Mapping):
         return {key: part if key == "body" else put_in(part, variables) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [put_in(part, variables) for part in value]
-    return value
-
-
-def _text_of(name: str, variables: Round) -> str:
-    if name not in variables:
-        return name
-    value = variables[name]
-    return in_brackets(value if isinstance(value, str) else repr(value))
+    return [put_in(part, variables) for part in value] if isinstance(value, list | tuple) else value
 
 
 ENTRIES = 20_000  #: most entries and instances of a model that its components make
@@ -609,145 +574,124 @@ class Components:
     def read_all(self) -> None:
         """Read also those that nothing adds, so that their faults are told."""
         for name in self.given:
-            self.find(name, f"components.{name}")
+            attempt(self.fault, self.find, name, f"components.{name}")
 
-    def find(self, name: Any, path: str) -> Component | None:
-        """The component of a name; None where there is none, or it has faults, which are told."""
+    def find(self, name: Any, path: str) -> Component:
+        """The component of a name; refused where there is none, or it has faults, which are told."""
         if not isinstance(name, str) or name not in self.given:
-            self.fault(path, f"no component {name!r}", nearest(str(name), self.given, "components"), "EG-NAME-UNKNOWN")
-            return None
+            remedy = nearest(str(name), self.given, "components")
+            raise Refused(path, f"no component {name!r}", remedy, "EG-NAME-UNKNOWN")
         if name in self.within:
             chain = ", ".join([*self.within[self.within.index(name) :], name])
-            self.fault(
-                path, f"the component {name!r} adds itself: {chain}", "remove one of these additions", "EG-CIRCLE"
-            )
-            return None
+            message = f"the component {name!r} adds itself: {chain}"
+            raise Refused(path, message, "remove one of these additions", "EG-CIRCLE")
         if name not in self.read:
             self.within.append(name)
-            self.read[name] = self._read(name)
+            self.read[name] = attempt(self.fault, self._read, name, self.given[name], f"components.{name}")
             self.within.pop()
-        return self.read[name]
+        if (result := self.read[name]) is None:
+            raise Refused
+        return result
 
-    def _read(self, name: str) -> Component | None:
-        raw, path = self.given[name], f"components.{name}"
-        wrong = fault_of_name(name)
-        if wrong:
+    def _read(self, name: str, raw: Any, path: str) -> Component:
+        if wrong := fault_of_name(name):
             self.fault(path, *wrong, "EG-NAME-FORM")
         if not isinstance(raw, Mapping):
-            self.fault(path, f"is not {kinds.Table.says}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
-            return None
+            raise Refused(path, f"is not {kinds.Table.says}", "write its keys, or {file: leg.yaml}", "EG-TYPE")
         check_keys(path, raw, COMPONENT, self.faults)
         if "file" in raw:
             if len(raw) > 1:
                 remedy = "give file alone; the file describes the whole component"
                 self.fault(path, "has keys beside file", remedy, "EG-CONFLICT")
-            return self._read_file(name, raw["file"], path)
-        start = f"{path}."
-        lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
-        description = Description(lines=lines)
-        self.fill(raw, start, description)
-        self.add(raw.get("add"), start, description)
-        description = undotted(description)
-        return self._checked(Component(name, start, description, self._attachments(raw, start), closed=False))
-
-    def _read_file(self, name: str, file: Any, path: str) -> Component | None:
-        if not isinstance(file, str):
-            self.fault(f"{path}.file", f"{file!r} is not {kinds.File.says}", "", "EG-TYPE")
-            return None
-        try:
-            description = self.open_file(file)
-        except FileNotFoundError:
-            self.fault(
-                f"{path}.file", f"there is no file {file}", "give its path from the folder of the model file", "EG-FILE"
-            )
-            return None
-        except UsageError as error:
-            self.fault(f"{path}.file", str(error), "", error.code)
-            return None
-        except OSError as error:
-            self.fault(f"{path}.file", f"{file} cannot be read ({error.strerror})", "", "EG-FILE")
-            return None
-        if description is None:
-            return None
-        self.incomplete |= description.incomplete
-        return self._checked(component_of(description, name, "", self.faults, f"{path}.file"))
-
-    def _checked(self, component: Component) -> Component:
-        for name in component.attachments:
-            if name in component.names.bodies or name in (GROUND_NAME, "body"):
-                message = f"the attachment {name!r} has the name of a body"
+            description = self._opened(raw["file"], f"{path}.file")
+            self.incomplete |= description.incomplete
+            component = component_of(description, name, "", self.faults, f"{path}.file")
+        else:
+            start = f"{path}."
+            lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
+            description = Description(lines=lines)
+            self.fill(raw, start, description)
+            self.add(raw.get("add"), start, description)
+            names = _attachments_of(raw)
+            if any(map(fault_of_name, names)):
+                message = f"{raw['attachments']!r} is not {kinds.Names.says}"
+                self.fault(f"{start}attachments", message, "such as [foot, top]", "EG-TYPE")
+                names = ()
+            component = Component(name, start, undotted(description), names, closed=False)
+        for one in component.attachments:
+            if one in component.bodies or one in (GROUND_NAME, "body"):
+                message = f"the attachment {one!r} has the name of a body"
                 self.fault(f"{component.place}attachments", message, "rename one of them", "EG-NAME-TAKEN")
         return component
 
-    def _attachments(self, raw: Mapping[str, Any], start: str) -> tuple[str, ...]:
-        listed = raw.get("attachments") or []
-        listed = [listed] if isinstance(listed, str) else listed
-        if not isinstance(listed, list) or any(fault_of_name(name) for name in listed):
-            self.fault(f"{start}attachments", f"{listed!r} is not {kinds.Names.says}", "such as [foot, top]", "EG-TYPE")
-            return ()
-        return tuple(listed)
+    def _opened(self, file: Any, path: str) -> Description:
+        """The description of a file."""
+        if not isinstance(file, str):
+            raise Refused(path, f"{file!r} is not {kinds.File.says}", "", "EG-TYPE")
+        try:
+            description = self.open_file(file)
+        except FileNotFoundError:
+            remedy = "give its path from the folder of the model file"
+            raise Refused(path, f"there is no file {file}", remedy, "EG-FILE") from None
+        except UsageError as error:
+            raise Refused(path, str(error), "", error.code) from None
+        except OSError as error:
+            raise Refused(path, f"{file} cannot be read ({error.strerror})", "", "EG-FILE") from None
+        if description is None:
+            raise Refused
+        return description
 
     # -- instances ------------------------------------------------------------------------------------------------
     def add(self, raw: Any, start: str, target: Description) -> None:
         """Add the instances of a section ``add`` to a description; ``start`` stands before its path."""
         for name, keys in self.faults.mapping(f"{start}add", raw, "write the names of the instances as keys").items():
-            if not self._add_one(name, keys, f"{start}add.{name}", target):
+            if not attempt(self.fault, self._add_one, name, keys, f"{start}add.{name}", target):
                 self.incomplete = True
 
     def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> bool:
-        wrong = fault_of_name(name)
-        if wrong:
-            self.fault(path, *wrong, "EG-NAME-FORM")
-            return False
+        if wrong := fault_of_name(name):
+            raise Refused(path, *wrong, "EG-NAME-FORM")
         if not isinstance(keys, Mapping):
-            self.fault(path, f"is not {kinds.Table.says}", "write component: NAME and its other keys", "EG-TYPE")
-            return False
+            raise Refused(path, f"is not {kinds.Table.says}", "write component: NAME and its other keys", "EG-TYPE")
         for key in keys:
             if key not in ADDED:
                 self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED), "EG-NAME-UNKNOWN")
         if "component" not in keys:
-            self.fault(f"{path}.component", "is missing", nearest("", self.given, "components"), "EG-MISSING")
-            return False
-        component = self.find(keys["component"], f"{path}.component")
-        rounds = rounds_of(keys["for"], f"{path}.for", self.fault) if "for" in keys else [{}]
+            raise Refused(f"{path}.component", "is missing", nearest("", self.given, "components"), "EG-MISSING")
+        component = attempt(self.fault, self.find, keys["component"], f"{path}.component")
+        rounds = attempt(self.fault, rounds_of, keys["for"], f"{path}.for") if "for" in keys else [{}]
         prefix = keys.get("prefix", f"{name}_")
         if prefix != "" and fault_of_name(prefix):
             remedy = "use letters, digits and underscores"
-            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", remedy, "EG-NAME-FORM")
-            return False
+            raise Refused(f"{path}.prefix", f"{prefix!r} cannot begin a name", remedy, "EG-NAME-FORM")
         if component is None or rounds is None:
-            return False
+            raise Refused
         if size_of(target) + component.size * len(rounds) > ENTRIES:
-            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances", "EG-TOO-LARGE")
-            return False
+            remedy = f"at most {ENTRIES} entries and instances"
+            raise Refused(path, "makes the model too large", remedy, "EG-TOO-LARGE")
         for k, variables in enumerate(rounds):
             number = str(k + 1) if "for" in keys else ""
             before = f"{prefix.rstrip('_')}{number}_" if number else prefix
-            instance = self._instance(component, f"{name}{number}", before, keys, variables, path)
-            if instance is None or not add_instance(target, component, instance, path, self.faults):
-                return False
+            instance = _instance(component, f"{name}{number}", before, keys, variables, path)
+            add_instance(target, component, instance, path, self.faults)
         return True
 
-    def _instance(
-        self, component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Any, path: str
-    ) -> Instance | None:
-        tables: dict[str, Mapping[str, Any]] = {}
-        for key in ("parameters", "inputs", "initial", "guess"):
-            raw = put_in(keys.get(key) or {}, variables)
-            if not isinstance(raw, Mapping):
-                self.fault(f"{path}.{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
-                return None
-            tables[key] = raw
-        at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
-        values = {**tables["parameters"], **tables["inputs"]}
-        named = named_attachments(component, at, f"{path}.at", self.fault)
-        if named is None:
-            return None
-        places = {one: f"{key}.{one}" for key in ("parameters", "inputs") for one in tables[key]}
-        return Instance(name, prefix, named, values, places, tables["initial"], tables["guess"])
+
+def _instance(
+    component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Round, path: str
+) -> Instance:
+    """The instance of a round."""
+    tables = {key: put_in(keys.get(key) or {}, variables) for key in ("parameters", "inputs", "initial", "guess")}
+    for key, raw in tables.items():
+        if not isinstance(raw, Mapping):
+            raise Refused(f"{path}.{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
+    at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
+    values = {n: (x, f"{path}.{key}.{n}") for key in ("parameters", "inputs") for n, x in tables[key].items()}
+    attached = named_attachments(component, at, f"{path}.at")
+    return Instance(name, prefix, attached, values, tables["initial"], tables["guess"])
 
 
-def named_attachments(component: Component, at: Any, path: str, fault: Fault) -> Mapping[str, Any] | None:
+def named_attachments(component: Component, at: Any, path: str) -> Mapping[str, Any]:
     """What is given as ``at``, by the names of attachments; one marker stands for the only one, or for ground."""
     if at is None:
         return {}
@@ -755,30 +699,28 @@ def named_attachments(component: Component, at: Any, path: str, fault: Fault) ->
         return at
     if len(component.attachments) > 1:
         remedy = f"give a mapping of {', '.join(component.attachments)}"
-        fault(path, f"{component.name} has several attachments", remedy, "EG-MISSING")
-        return None
+        raise Refused(path, f"{component.name} has several attachments", remedy, "EG-MISSING")
     return {(component.attachments or (GROUND_NAME,))[0]: at}
 
 
-def claim(target: Description, instance: Instance, path: str, fault: Fault) -> bool:
-    """Take the name of an instance into a description; False, and a fault, where it is taken."""
+def claim(target: Description, instance: Instance, path: str) -> None:
+    """Take the name of an instance into a description; refused where it is taken."""
     if instance.name in target.instances:
-        fault(path, f"there is an instance {instance.name!r} already", "rename one of them", "EG-NAME-TAKEN")
-        return False
+        raise Refused(path, f"there is an instance {instance.name!r} already", "rename one of them", "EG-NAME-TAKEN")
     if any(entry.name == instance.name for entry in target.sections["bodies"]):
         message = f"{instance.name!r} is a body too, so {instance.name}.x could mean two things"
-        fault(path, message, "rename one of them", "EG-NAME-TAKEN")
-        return False
+        raise Refused(path, message, "rename one of them", "EG-NAME-TAKEN")
     target.instances[instance.name] = instance.prefix
-    return True
+
+
+def _attachments_of(values: Mapping[str, Any]) -> tuple[Any, ...]:
+    """The names of attachments; one name counts as a list."""
+    raw = values.get("attachments") or []
+    return tuple(raw) if isinstance(raw, list | tuple) else (raw,)
 
 
 def component_of(description: Description, name: str, place: str, faults: Faults, path: str) -> Component:
     """A component of the description of a whole model, which is at ``path``; it knows no names but its own."""
-
-    def report(inside: str, message: str, remedy: str, code: str) -> None:
-        faults.take(Problem(f"{place}{inside}", message, remedy, *description.place(inside), code))
-
     for key in ("lagrangian", "equations"):
         if description.values.get(key) is not None:
             remedy = "a component can contain only bodies, joints and what belongs to them"
@@ -787,15 +729,12 @@ def component_of(description: Description, name: str, place: str, faults: Faults
     for entry in description.sections["bodies"]:
         if check is not None and entry.name != GROUND_NAME:
             entry.values.setdefault("check_inertia", check)
-    attachments = description.values.get("attachments") or []
-    attachments = [attachments] if isinstance(attachments, str) else attachments
-    component = Component(name, place, description, tuple(map(str, attachments)))
-    ground = Attached(GROUND_NAME, GROUND_NAME, {})
-    own = dict.fromkeys((*component.attachments, GROUND_NAME), ground)
-    check = Renaming(component.names, "", {}, own, True, report)
+    component = Component(name, place, description, tuple(map(str, _attachments_of(description.values))))
+    own = dict.fromkeys((*component.attachments, GROUND_NAME), Attached(GROUND_NAME, GROUND_NAME, {}))
+    known = Renaming(component, "", {}, own, partial(component.report, faults))
     for section, entries in description.sections.items():
         for entry in entries:
-            visit_entry(section, entry, check)
+            visit_entry(section, entry, known)
     return component
 
 

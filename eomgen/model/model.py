@@ -13,7 +13,7 @@ from ..base.names import hint
 from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
 from .build_functions import FallbackSource
 from .build_mechanism import build
-from .components import Component, Instance, add_instance, component_of, named_attachments
+from .components import Component, Instance, add_instance, attempt, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, items, model_html
 from .element_methods import ElementMethods
 from .equations import describe_equations, describe_lagrangian
@@ -376,14 +376,17 @@ class Builder(ElementMethods):
         raw = [name for group in groups.values() for name in group]
         if twice := sorted({name for name in raw if raw.count(name) > 1}):
             raise at_odds(f"add {part.name}: {', '.join(twice)} given twice; give each value once")
-        numbers = {n: plain(value) for group in groups.values() for n, value in group.items() if value is not None}
         name = prefix.rstrip("_") or part.name
-        self._note_line(f"add.{name}")
+        path = f"add.{name}"
+        numbers = {n: (plain(x), f"{path}.{n}") for group in groups.values() for n, x in group.items() if x is not None}
+        self._note_line(path)
         faults = Faults(Description(lines=self._description.lines))
-        named = named_attachments(part, self._references(at), "at", faults.add)
-        instance = Instance(name, prefix, named or {}, numbers)
-        if named is not None:
-            add_instance(self._description, part, instance, f"add.{name}", faults, whole=True)
+
+        def add() -> None:
+            instance = Instance(name, prefix, named_attachments(part, self._references(at), "at"), numbers)
+            add_instance(self._description, part, instance, path, faults, whole=True)
+
+        attempt(faults.add, add)
         if faults:
             messages = "; ".join(f"{p.message}{f' ({p.remedy})' if p.remedy else ''}" for p in faults.problems)
             raise UsageError(f"add {part.name}: {messages}", code=faults.problems[0].code)
