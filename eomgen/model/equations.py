@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -43,19 +43,27 @@ def describe_lagrangian(
         raw["dissipation"] = dissipation
     if items(constraints) or not isinstance(constraints, list | tuple):
         raw["constraints"] = constraints
-
-    description = Description(values={"name": name, "lagrangian": raw})
     values, driven = named("parameters", parameters), named("inputs", inputs)
-    known = {q + rate for q in names for rate in RATES} | set(driven)
+    known = {q + rate for q in names for rate in RATES}
     stems = {split_rate(source)[0] for source in driven}
-    result = _names_of_section(raw)
-    further = derivative_names([*values_in(raw)])
-    others = [name for name in sorted({*result, *further}) if name not in {*known, *values}]
-    rates = [name for name in others if split_rate(name)[0] in stems]
-    known |= set(rates)
-    own = {name: value for name, value in values.items() if name not in known}
-    description.declare(own, driven | dict.fromkeys(rates), [name for name in result if name not in known])
-    give_latex(description, "lagrangian", latex)
+    used = {*_names_of_section(raw), *derivative_names([*values_in(raw)])} - {*known, *values, *driven}
+    rates = dict.fromkeys(name for name in sorted(used) if split_rate(name)[0] in stems)
+    return _describe(name, "lagrangian", raw, known, values, driven | rates, latex)
+
+
+def _describe(
+    name: str, section: str, raw: dict[str, Any], known: set[str], parameters: Mapping[str, Any],
+    inputs: Mapping[str, Any], latex: Any,
+) -> Description:  # fmt: skip
+    """The description of a section; of the names in it that it does not declare those are parameters that no input is.
+
+    ``known`` are names that the section declares.
+    """
+    description = Description(values={"name": name, section: raw})
+    known |= {*inputs}
+    own = {name: value for name, value in parameters.items() if name not in known}
+    description.declare(own, inputs, [name for name in _names_of_section(raw) if name not in known])
+    give_latex(description, section, latex)
     return description
 
 
@@ -129,17 +137,11 @@ def describe_equations(
         raw["constraints"] = items(constraints)
     if forces := names_of("equations.multipliers", multipliers, "a multiplier"):
         raw["multipliers"] = forces
-    for key, energy in (("kinetic_energy", kinetic_energy), ("potential_energy", potential_energy)):
-        if energy is not None:
-            raw[key] = energy
-    description = Description(values={"name": name, "equations": raw})
-    values, driven = named("parameters", parameters), named("inputs", inputs)
+    energies = {"kinetic_energy": kinetic_energy, "potential_energy": potential_energy}
+    raw |= {key: energy for key, energy in energies.items() if energy is not None}
     known = {part + rate for part in (*names, *speeds) for rate in RATES}
-    known |= {*driven, *raw.get("intermediates", ()), *raw.get("multipliers", ())}
-    own = {name: value for name, value in values.items() if name not in known}
-    description.declare(own, driven, [name for name in _names_of_section(raw) if name not in known])
-    give_latex(description, "equations", latex)
-    return description
+    known |= {*raw.get("intermediates", ()), *raw.get("multipliers", ())}
+    return _describe(name, "equations", raw, known, named("parameters", parameters), named("inputs", inputs), latex)
 
 
 def _names_of_section(raw: Mapping[str, Any]) -> list[str]:
@@ -181,6 +183,14 @@ def _names(reader: Reader, path: str, values: Mapping[str, Any], key: str, defau
     return [str(name_of(item)) for item in listed]
 
 
+def _expressions(reader: Reader, path: str, raw: Any, read: Callable[[str, Any], Expr]) -> tuple[Expr, ...]:
+    """The expressions of a list."""
+    listed = items(raw)
+    if listed is None:
+        reader.wrong(path, raw, kinds.Scalars)
+    return tuple(read(f"{path}[{k}]", part) for k, part in enumerate(listed or ()))
+
+
 def _check_constraint(reader: Reader, path: str, expression: Expr, v: Sequence[str]) -> None:
     """Note a comparison, or an expression of velocities that is not linear in them."""
     if is_comparison(expression):
@@ -220,20 +230,17 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
         return None
     path = "lagrangian"
     names = [str(q) for q in values.get("coordinates", ())]
-    zero = reader.graph.zero
-    expression = (
-        reader.expression(f"{path}.expression", values["expression"], MOTION) if "expression" in values else zero
-    )
-    dissipation = reader.expression(f"{path}.dissipation", values.get("dissipation", 0), MOTION)
-    constraints = items(values.get("constraints", ()))
-    if constraints is None:
-        reader.wrong(f"{path}.constraints", values["constraints"], kinds.Scalars)
-        constraints = []
+
+    def read(place: str, value: Any) -> Expr:
+        return reader.expression(place, value, MOTION)
+
+    expression = read(f"{path}.expression", values["expression"]) if "expression" in values else reader.graph.zero
+    dissipation = read(f"{path}.dissipation", values.get("dissipation", 0))
     forces = _forces(reader, f"{path}.forces", values.get("forces", ()), names)
-    rows = [reader.expression(f"{path}.constraints[{k}]", row, MOTION) for k, row in enumerate(constraints)]
+    rows = _expressions(reader, f"{path}.constraints", values.get("constraints", ()), read)
     for k, row in enumerate(rows):
         _check_constraint(reader, f"{path}.constraints[{k}]", row, [f"{name}_dot" for name in names])
-    return Lagrangian(tuple(names), expression, forces, dissipation, tuple(rows))
+    return Lagrangian(tuple(names), expression, forces, dissipation, rows)
 
 
 def _forces(reader: Reader, path: str, raw: Any, names: list[str]) -> tuple[Expr, ...]:
@@ -361,27 +368,12 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         expression = reader.expression(path, value, MOTION, local)
         return substitute([expression], mapping)[0] if not symbols_of([expression]).isdisjoint(derived) else expression
 
-    def listed(key: str, size: int | None) -> tuple[Expr, ...]:
-        path, raw = f"{PATH}.{key}", values.get(key, ())
-        parts = items(raw)
-        if parts is None:
-            reader.wrong(path, raw, kinds.Scalars)
-            return ()
-        if size is not None and len(parts) != size and key in values:
-            faults.add(
-                path, f"{len(parts)} expressions for {size} velocities", "give one for each, in order", "EG-SHAPE"
-            )
-        return tuple(read(f"{path}[{k}]", part) for k, part in enumerate(parts))
-
-    rows: list[tuple[Expr, ...]] = []
     raw = values.get("mass_matrix", ())
     lines = items(raw)
     if lines is None or any(items(line) is None for line in lines):
         reader.wrong(f"{PATH}.mass_matrix", raw, kinds.Matrix)
         lines = []
-    for i, line in enumerate(lines):
-        parts = items(line) or []
-        rows.append(tuple(read(f"{PATH}.mass_matrix[{i}][{j}]", part) for j, part in enumerate(parts)))
+    rows = tuple(_expressions(reader, f"{PATH}.mass_matrix[{i}]", line, read) for i, line in enumerate(lines))
     if "mass_matrix" in values and {len(rows), *map(len, rows)} != {len(v)}:
         if not faults.under(f"{PATH}.mass_matrix"):
             shape = f"{len(rows)} x {max(map(len, rows), default=0)}"
@@ -389,7 +381,7 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
             faults.add(f"{PATH}.mass_matrix", f"is {shape} for {len(v)} velocities", remedy, "EG-SHAPE")
     elif not faults.under(f"{PATH}.mass_matrix"):
         _check_mass_matrix(reader, rows, v)
-    constraints = listed("constraints", None)
+    constraints = _expressions(reader, f"{PATH}.constraints", values.get("constraints", ()), read)
     for k, constraint in enumerate(constraints):
         _check_constraint(reader, f"{PATH}.constraints[{k}]", constraint, v)
         if constraint.is_zero:
@@ -403,10 +395,11 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         message = f"{len(named)} names for {len(constraints)} constraints"
         faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order", "EG-SHAPE")
     kinetic, potential = (read(f"{PATH}.{key}", values.get(key, 0)) for key in ("kinetic_energy", "potential_energy"))
-    forcing = listed("forcing", len(v))
-    return GivenEquations(
-        tuple(q), tuple(v), rates, tuple(rows), forcing, constraints, tuple(named), kinetic, potential
-    )
+    forcing = _expressions(reader, f"{PATH}.forcing", values.get("forcing", ()), read)
+    if len(forcing) != len(v) and items(values.get("forcing")) is not None:
+        message = f"{len(forcing)} expressions for {len(v)} velocities"
+        faults.add(f"{PATH}.forcing", message, "give one for each, in order", "EG-SHAPE")
+    return GivenEquations(tuple(q), tuple(v), rates, rows, forcing, constraints, tuple(named), kinetic, potential)
 
 
 def check_energies(raw: GivenEquations | None, outputs: Sequence[Output], faults: Faults) -> None:

@@ -67,12 +67,12 @@ class Wrench(NamedTuple):
     on: str = ""
 
     @property
-    def force(self) -> tuple[Any, Any, Any]:
+    def force(self) -> Triple:
         """Components of the force (N)."""
         return (self._part("x"), self._part("y"), self._part("z"))
 
     @property
-    def moment(self) -> tuple[Any, Any, Any]:
+    def moment(self) -> Triple:
         """Components of the moment (N m)."""
         return (self._part("mx"), self._part("my"), self._part("mz"))
 
@@ -130,28 +130,20 @@ class ElementHandle:
         return f"<{type(self).__name__} {self.name}: {self._entry.values.get('type')}>"
 
 
+def _of_element(word: str, doc: str) -> Any:
+    """A property that is the symbol of a quantity of an element."""
+    return property(lambda element: symbol(str(Named(word, element.name))), doc=doc)
+
+
 class ForceHandle(ElementHandle):
     """A force element of the model; what it does can stand in outputs, events and other laws."""
 
-    @property
-    def force(self) -> Any:
-        """Force along its path (N or N m), positive where it increases it; of a contact the normal force."""
-        return symbol(f"force({self.name})")
-
-    @property
-    def length(self) -> Any:
-        """Length or angle of its path (m or rad), or penetration of a contact (m)."""
-        return symbol(f"length({self.name})")
-
-    @property
-    def rate(self) -> Any:
-        """Rate of :attr:`length` (m/s or rad/s)."""
-        return symbol(f"rate({self.name})")
-
-    @property
-    def power(self) -> Any:
-        """Power of everything that it exerts (W): positive where it drives the mechanism."""
-        return symbol(f"power({self.name})")
+    force = _of_element(
+        "force", "Force along its path (N or N m), positive where it increases it; of a contact normal."
+    )
+    length = _of_element("length", "Length or angle of its path (m or rad), or penetration of a contact (m).")
+    rate = _of_element("rate", "Rate of :attr:`length` (m/s or rad/s).")
+    power = _of_element("power", "Power of everything that it exerts (W): positive where it drives the mechanism.")
 
     def on(self, marker: Labelled, axes: Labelled | None = None) -> Wrench:
         """Force and moment that it exerts on the body of a marker, in ground axes or along those of another marker.
@@ -180,6 +172,17 @@ class ConstraintHandle(ElementHandle):
         return symbol(str(Named(MULTIPLIER, f"{self.name}.{row}" if row else self.name)))
 
 
+def _vector(prefix: str, suffix: str, doc: str) -> Any:
+    """A property that is three symbols, of the quantities along x, y and z."""
+
+    def read(motion: Motion) -> Triple:
+        ends = motion._ends()
+        x, y, z = (symbol(str(Named(f"{prefix}{axis}{suffix}", *ends))) for axis in "xyz")
+        return (x, y, z)
+
+    return property(read, doc=doc)
+
+
 class Motion:
     """The motion of a marker in ground axes, or in others, as SymPy symbols for outputs, events and force laws."""
 
@@ -187,35 +190,11 @@ class Motion:
         """Labels of the marker, of the one it is seen from, and of the one whose axes count."""
         raise NotImplementedError
 
-    def _triple(self, prefix: str, suffix: str = "") -> Triple:
-        ends = self._ends()
-        x, y, z = (symbol(str(Named(f"{prefix}{axis}{suffix}", *ends))) for axis in "xyz")
-        return (x, y, z)
-
-    @property
-    def position(self) -> Triple:
-        """Position of the origin (m)."""
-        return self._triple("")
-
-    @property
-    def velocity(self) -> Triple:
-        """Velocity of the origin (m/s)."""
-        return self._triple("v")
-
-    @property
-    def acceleration(self) -> Triple:
-        """Acceleration of the origin (m/s^2), for outputs."""
-        return self._triple("a")
-
-    @property
-    def angular_velocity(self) -> Triple:
-        """Angular velocity of the body (rad/s)."""
-        return self._triple("w")
-
-    @property
-    def angular_acceleration(self) -> Triple:
-        """Angular acceleration of the body (rad/s^2), for outputs."""
-        return self._triple("w", "_dot")
+    position = _vector("", "", "Position of the origin (m).")
+    velocity = _vector("v", "", "Velocity of the origin (m/s).")
+    acceleration = _vector("a", "", "Acceleration of the origin (m/s^2), for outputs.")
+    angular_velocity = _vector("w", "", "Angular velocity of the body (rad/s).")
+    angular_acceleration = _vector("w", "_dot", "Angular acceleration of the body (rad/s^2), for outputs.")
 
 
 @dataclass(frozen=True)
@@ -253,15 +232,12 @@ class MarkerHandle(Motion):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.label}>"
 
-    @property
-    def body_angular_velocity(self) -> Triple:
-        """Angular velocity in the marker's own axes (rad/s), as SymPy symbols for outputs, events and force laws."""
-        return self._triple("w", "_body")
-
-    @property
-    def body_angular_acceleration(self) -> Triple:
-        """Angular acceleration of the body in the marker's own axes (rad/s^2), as SymPy symbols for outputs."""
-        return self._triple("w", "_body_dot")
+    body_angular_velocity = _vector(
+        "w", "_body", "Angular velocity in its own axes (rad/s), as SymPy symbols for outputs, events and force laws."
+    )
+    body_angular_acceleration = _vector(
+        "w", "_body_dot", "Angular acceleration of the body in its own axes (rad/s^2), as SymPy symbols for outputs."
+    )
 
     @property
     def angle(self) -> Any:
@@ -399,6 +375,19 @@ def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
     return {key: value for key, value in (("axes", axes), ("matrix", plain)) if value is not None}
 
 
+def _derivative(order: int, doc: str) -> Any:
+    """A property that is the symbol of the coordinate of a joint of one degree, or of a rate of it."""
+
+    def read(joint: JointHandle) -> Any:
+        names = joint.coordinate_names
+        if len(names) != 1:
+            shown = ", ".join(names) or "none"
+            raise ill_placed(f"joint {joint.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
+        return symbol(names[0] + RATES[order])
+
+    return property(read, doc=doc)
+
+
 class JointHandle(ElementHandle):
     """A joint of the model; its coordinates are SymPy symbols that forces and outputs can use."""
 
@@ -422,20 +411,11 @@ class JointHandle(ElementHandle):
         joint = sketch(str(self._entry.values.get("type")), self._entry.values)
         return tuple(symbol(name) for name in velocity_names(joint, self.name, names))
 
-    @property
-    def coordinate(self) -> Any:
-        """The coordinate of a joint of one degree, as a SymPy symbol."""
-        return symbol(self._only())
-
-    @property
-    def velocity(self) -> Any:
-        """The rate of the coordinate of a joint of one degree, as a SymPy symbol."""
-        return symbol(self._only() + RATES[1])
-
-    @property
-    def acceleration(self) -> Any:
-        """The second derivative of the coordinate of a joint of one degree, as a SymPy symbol (for outputs)."""
-        return symbol(self._only() + RATES[2])
+    coordinate = _derivative(0, "The coordinate of a joint of one degree, as a SymPy symbol.")
+    velocity = _derivative(1, "The rate of the coordinate of a joint of one degree, as a SymPy symbol.")
+    acceleration = _derivative(
+        2, "The second derivative of the coordinate of a joint of one degree, as a SymPy symbol (for outputs)."
+    )
 
     @property
     def reaction(self) -> JointReaction:
@@ -445,13 +425,6 @@ class JointHandle(ElementHandle):
     def reaction_in(self, axes: MarkerHandle) -> JointReaction:
         """What the joint carries, along the axes of a marker."""
         return JointReaction(REACTION, self.name, noted(axes))
-
-    def _only(self) -> str:
-        names = self.coordinate_names
-        if len(names) != 1:
-            shown = ", ".join(names) or "none"
-            raise ill_placed(f"joint {self.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
-        return names[0]
 
 
 class Settings(dict[str, Any]):
