@@ -271,18 +271,12 @@ SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "capsule": ("radius
 
 def read_body_shapes(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> list[BodyShape]:
     """Shapes of one body, where its description has no faults; ``display`` comes first, as solids are for the mass."""
-    displayed = [
-        shape
-        for k, raw in enumerate(items(values.get("display", ())) or ())
-        if (shape := _displayed(reader, f"{path}.display[{k}]", body, raw)) is not None
-    ]
-    if displayed:
-        return displayed
-    return [
-        shape
-        for k, raw in enumerate(items(values.get("solids", ())) or ())
-        if not raw.get("subtract") and (shape := _solid_shape(reader, f"{path}.solids[{k}]", body, raw)) is not None
-    ]
+    for key, read in (("display", _displayed), ("solids", _solid_shape)):
+        raw = enumerate(items(values.get(key, ())) or ())
+        made = [read(reader, f"{path}.{key}[{k}]", body, one) for k, one in raw if not one.get("subtract")]
+        if shapes := [shape for shape in made if shape is not None]:
+            return shapes
+    return []
 
 
 def _sizes(reader: Reader, path: str, values: Mapping[str, Any], keys: tuple[str, ...]) -> tuple[Expr, ...]:
@@ -401,12 +395,8 @@ def _own(
     if "first_moment" in values:
         moment = reader.vector(f"{path}.first_moment", values["first_moment"])
         if mass.is_zero and not all(x.is_zero for x in moment):
-            reader.fault(
-                f"{path}.first_moment",
-                "a body without mass has no first moment",
-                "give the body a mass",
-                "EG-NO-INERTIA",
-            )
+            message = "a body without mass has no first moment"
+            reader.fault(f"{path}.first_moment", message, "give the body a mass", "EG-NO-INERTIA")
         com = o if mass.is_zero else (moment[0] / mass, moment[1] / mass, moment[2] / mass)
     else:
         com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o

@@ -81,13 +81,9 @@ def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
     """The function of an entry whose keys are checked; None if it is at fault, which is noted."""
     faults, path, values = reader.faults, entry.path, entry.values
     if not entry.trusted:
-        faults.add(
-            path,
-            "is native code, and native code of model files is not allowed in this call",
-            f"read {values['source']!r} and, if you trust it, use --allow-native (in Python load(path, "
-            "allow_native=True))",
-            "EG-REFUSED",
-        )
+        message = "is native code, and native code of model files is not allowed in this call"
+        remedy = f"read {values['source']!r} and, if you trust it, use --allow-native (in Python load(path, "
+        faults.add(path, message, f"{remedy}allow_native=True))", "EG-REFUSED")
         return None
     arity = _arity(reader, path, values)
     names = _names(reader, entry, arity) if arity else None
@@ -291,12 +287,8 @@ def read_table(reader: Reader, name: str, path: str, values: Mapping[str, Any]) 
             remedy = "a periodic table needs three or more, of which the last repeats the first"
             faults.add(f"{path}.x", "has fewer than three points", remedy, "EG-SHAPE")
         elif abs(y[-1] - y[0]) > PERIODIC * np.max(np.abs(y)):
-            faults.add(
-                f"{path}.y",
-                f"ends with {y[-1]:g} and begins with {y[0]:g}",
-                "make the two values of a period equal",
-                "EG-CONTRADICTION",
-            )
+            message = f"ends with {y[-1]:g} and begins with {y[0]:g}"
+            faults.add(f"{path}.y", message, "make the two values of a period equal", "EG-CONTRADICTION")
         y[-1] = y[0]
     if faults.under(path):
         return None

@@ -61,20 +61,22 @@ def in_si(reader: Reader, path: str, value: float | None, unit: Unit) -> float |
 
 def read_parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
     """The parameter of an entry."""
-    reader.names.declare("parameter", entry.name, entry.path)
-    unit, doc = read_described(reader, entry, PARAMETER)
-    raw = entry.values.get("value")
-    value = None if raw is None else reader.number(f"{entry.path}.value", raw)
-    return Parameter(str(entry.name), in_si(reader, f"{entry.path}.value", value, unit), unit.si, doc)
+    return Parameter(str(entry.name), *_declared(reader, entry, "parameter", PARAMETER))
 
 
 def read_input(reader: Reader, entry: DescribedEntry) -> Input:
     """The input of an entry, without its expression over time."""
-    reader.names.declare("input", entry.name, entry.path)
-    unit, doc = read_described(reader, entry, INPUT)
-    raw = entry.values.get("value")
-    value = 0.0 if raw is None else reader.number(f"{entry.path}.value", raw)
-    return Input(str(entry.name), in_si(reader, f"{entry.path}.value", value, unit) or 0.0, unit.si, doc)
+    value, *rest = _declared(reader, entry, "input", INPUT)
+    return Input(str(entry.name), value or 0.0, *rest)
+
+
+def _declared(reader: Reader, entry: DescribedEntry, kind: str, fields: Fields) -> tuple[float | None, str, str]:
+    """Value, SI unit and doc of an entry whose name is declared."""
+    reader.names.declare(kind, entry.name, entry.path)
+    unit, doc = read_described(reader, entry, fields)
+    raw, path = entry.values.get("value"), f"{entry.path}.value"
+    value = None if raw is None else reader.number(path, raw)
+    return in_si(reader, path, value, unit), unit.si, doc
 
 
 def with_signal(reader: Reader, declared: Input, entry: DescribedEntry) -> Input:
@@ -159,14 +161,11 @@ class Outputs:
         text, kinds = entry.values.get("expression"), self._reader.names.kinds
         names = {*symbols_of([expression]), *names_of(text)}
         motions = [*filter(None, map(Named.parse, names)), *motions_of(text)]
+        outputs = [k for k in (self._places[name] for name in names if name in self._places) if k not in self._open]
         return (
             any(motion.level in VELOCITIES for motion in motions)
             or any(kinds.get(name) in ("velocity", "rate") for name in names)
-            or any(
-                self._at(k)[0].of_velocities
-                for k in (self._places[name] for name in names if name in self._places)
-                if k not in self._open
-            )
+            or any(self._at(k)[0].of_velocities for k in outputs)
         )
 
 
@@ -241,9 +240,8 @@ def _friction(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[flo
             remedy = nearest(name, outputs, "outputs")
             reader.fault(f"{path}.slip", f"no output {name!r} for the sliding velocity", remedy, "EG-NAME-UNKNOWN")
         elif (unit := reader.units.get(f"outputs.{name}")) is not None and unit.size != 1.0:
-            reader.fault(
-                f"{path}.slip", f"the output {name!r} is in {unit.text}", "give it in m/s, without a unit", "EG-UNIT"
-            )
+            message = f"the output {name!r} is in {unit.text}"
+            reader.fault(f"{path}.slip", message, "give it in m/s, without a unit", "EG-UNIT")
     return friction, tuple(names)
 
 
@@ -366,12 +364,8 @@ def declare_states(
     """
     if entries and bare:
         message = "a bare Lagrangian, or equations, have no states beside them"
-        reader.fault(
-            "states",
-            message,
-            "write them as velocities of from_equations, or describe bodies and joints",
-            "EG-CONFLICT",
-        )
+        remedy = "write them as velocities of from_equations, or describe bodies and joints"
+        reader.fault("states", message, remedy, "EG-CONFLICT")
     usable = []
     for entry in entries:
         if isinstance(entry.name, str) and entry.name.endswith("_dot"):

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partialmethod
 from typing import Any, NamedTuple
 
 from ..base.names import place_of_marker
@@ -339,8 +340,7 @@ class _Check:
         self._alike(i, parts, operands)
         return NONE
 
-    def _sign(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
-        return NONE
+    _sign: Any = staticmethod(lambda i, parts, operands: NONE)
 
     def _pure(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
         for own, k in zip(parts, operands, strict=True):
@@ -362,8 +362,7 @@ class _Check:
         kind, *value = self.graph.nodes[i]
         return kind == "const" and value[0] in _RATIOS
 
-    def _quotient(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
-        return self._product(i, parts, operands, -1)
+    _quotient = partialmethod(_product, power=-1)
 
     def _root(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
         return None if parts[0].dimension is None else NONE.times(parts[0].dimension, 0.5)

@@ -385,12 +385,8 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     for k, constraint in enumerate(constraints):
         _check_constraint(reader, f"{PATH}.constraints[{k}]", constraint, v)
         if constraint.is_zero:
-            faults.add(
-                f"{PATH}.constraints[{k}]",
-                "is 0 for every motion, so it constrains nothing",
-                "leave it out",
-                "EG-REDUNDANT",
-            )
+            message = "is 0 for every motion, so it constrains nothing"
+            faults.add(f"{PATH}.constraints[{k}]", message, "leave it out", "EG-REDUNDANT")
     if named and len(named) != len(constraints):
         message = f"{len(named)} names for {len(constraints)} constraints"
         faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order", "EG-SHAPE")

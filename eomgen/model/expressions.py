@@ -37,6 +37,7 @@ _JOINED = re.compile(r"(?<![A-Za-z0-9_])\.?[0-9][0-9A-Za-z_.]*?(and|or|not|if|is
 #: Keywords of motions that Python does not allow as such, and what stands for them in its tree.
 _KEYWORDS = {"in": "_n", "from": "_rom"}
 _KEYWORD = re.compile(r"\b(in|from)(?=\s*=(?!=))")
+_LARGE = "EG-TOO-LARGE"
 _UNFINISHED = "close the bracket; between { } of a model file put an expression with commas in quotes"
 _HINTS = {
     "%": "there is no remainder operator",
@@ -83,38 +84,31 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     ``resolve`` gives the expression of a name, ``locate`` that of a marker's motion; without it such calls are refused.
     An ExpressionError says what is not allowed, in which column, and what is.
     """
+    walker = _Walker(text, 0, graph, resolve, locate)
     if len(text) > LENGTH:
-        raise ExpressionError(
-            f"an expression of {len(text)} characters is too long", 1, f"at most {LENGTH}", text, code="EG-TOO-LARGE"
-        )
+        raise walker.wrong(0, f"an expression of {len(text)} characters is too long", f"at most {LENGTH}", _LARGE)
     if not text.strip():
-        raise ExpressionError("the expression is empty", 1, allowed(), text)
-    foreign = _FOREIGN.search(text)
-    if foreign:
+        raise walker.wrong(0, "the expression is empty")
+    if foreign := _FOREIGN.search(text):
         mark = foreign.group()
-        raise ExpressionError(
-            f"{mark!r} is not allowed in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
-        )
-    joined = _JOINED.search(text)
-    if joined:
-        word = joined.group(1)
-        raise ExpressionError(
-            f"a number is followed directly by {word!r}", joined.start(1) + 1, "write a space between them", text
-        )
+        raise walker.wrong(foreign.start(), f"{mark!r} is not allowed in an expression", _HINTS.get(mark))
+    if joined := _JOINED.search(text):
+        message = f"a number is followed directly by {joined[1]!r}"
+        raise walker.wrong(joined.start(1), message, "write a space between them")
     line = _KEYWORD.sub(lambda result: _KEYWORDS[result[1]], re.sub(r"\s", " ", text))
-    start = len(line) - len(line.lstrip())
+    walker.start = len(line) - len(line.lstrip())
     try:
-        tree = parse_python(line[start:].rstrip() + "\n", statement=True)
+        tree = parse_python(line[walker.start :].rstrip() + "\n", statement=True)
     except SyntaxError as error:
-        column = (error.offset or 1) + start
-        remedy = _UNFINISHED if "never closed" in error.msg else allowed()
-        raise ExpressionError(f"not a valid expression ({error.msg})", column, remedy, text) from None
+        remedy = _UNFINISHED if "never closed" in error.msg else None
+        column = (error.offset or 1) + walker.start - 1
+        raise walker.wrong(column, f"not a valid expression ({error.msg})", remedy) from None
     except (ValueError, MemoryError, RecursionError):
-        raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text, code="EG-TOO-LARGE") from None
+        raise walker.wrong(0, "nested too deeply", f"at most {DEPTH} levels", _LARGE) from None
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
-        raise ExpressionError("this is a statement, not an expression", start + 1, allowed(), text)
-    return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)
+        raise walker.wrong(walker.start, "this is a statement, not an expression")
+    return walker.walk(body[0].value, 0)
 
 
 def names_in(text: str) -> set[str]:
@@ -142,9 +136,12 @@ class _Walker:
     words: Mapping[str, tuple[int, int]] = field(default_factory=callable_names)
     size: int = 0
 
+    def wrong(self, place: int, message: str, remedy: str | None = None, code: str = "") -> ExpressionError:
+        """What is wrong at a place of the text."""
+        return ExpressionError(message, place + 1, allowed() if remedy is None else remedy, self.text, code=code)
+
     def fault(self, node: ast.AST, message: str, remedy: str | None = None, code: str = "") -> ExpressionError:
-        column = getattr(node, "col_offset", 0) + self.start + 1
-        return ExpressionError(message, column, allowed() if remedy is None else remedy, self.text, code)
+        return self.wrong(getattr(node, "col_offset", 0) + self.start, message, remedy, code)
 
     def walk(self, node: ast.expr, depth: int) -> Expr:
         self.size += 1

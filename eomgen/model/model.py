@@ -32,7 +32,8 @@ from .handles import (
 from .methods import check_keywords, checked_keywords, keywords_of
 from .names import fault_of_name
 from .quantities import COM
-from .sympy_face import SympyNames, function, named, names_of, one_or_several, require_name, symbol
+from .sympy_face import SympyNames, named, names_of, one_or_several, require_name, symbol
+from .sympy_face import function as sympy_function
 from .yaml_file import describe_yaml_file, plain, plain_description, yaml_text
 
 if TYPE_CHECKING:
@@ -45,6 +46,15 @@ Vector = Sequence[Any]
 def _symbol(name: str, doc: str) -> Any:
     """A property that is the SymPy symbol of a name."""
     return property(lambda model: symbol(name), doc=doc)
+
+
+def _setting(key: str, default: Any, doc: str) -> Any:
+    """A property that is a value of the description."""
+
+    def give(model: Builder, value: Any) -> None:
+        model._description.values[key] = value
+
+    return property(lambda model: model._description.values.get(key, default), give, doc=doc)
 
 
 def _settings(key: str, doc: str) -> Any:
@@ -255,20 +265,10 @@ class Builder(ElementMethods):
             raise incomplete(
                 "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
             )
-        raw = {
-            "source": str(source),
-            "function": function,
-            "arguments": arguments,
-            "derivatives": derivatives,
-            "second_derivatives": second_derivatives,
-            "python": fallback,
-        }
-        return self._function("native", name, raw)
-
-    def _function(self, type_name: str, name: str, keys: dict[str, Any]) -> Any:
-        raw = {key: value for key, value in keys.items() if value is not None}
-        self._add("functions", name, {"type": type_name, **raw})
-        return function(name)
+        raw = {"type": "native", "source": str(source), "function": function, "arguments": arguments}
+        raw |= {"derivatives": derivatives, "second_derivatives": second_derivatives, "python": fallback}
+        self._add("functions", name, {key: value for key, value in raw.items() if value is not None})
+        return sympy_function(name)
 
     # -- bodies ---------------------------------------------------------------------------------------------------
     @property
@@ -296,15 +296,11 @@ class Builder(ElementMethods):
         entries = self._description.sections["bodies"]
         return BodyHandle(self, name, next((entry for entry in entries if entry.name == name), None))
 
-    @property
-    def check_inertia(self) -> bool | str:
-        """What happens to a mass and inertia that no rigid body can have: error (True), note or off (False)."""
-        raw: bool | str = self._description.values.get("check_inertia", True)
-        return raw
-
-    @check_inertia.setter
-    def check_inertia(self, check: bool | str) -> None:
-        self._description.values["check_inertia"] = check
+    check_inertia = _setting(
+        "check_inertia",
+        True,
+        "What happens to a mass and inertia that no rigid body can have: error (True), note or off (False).",
+    )
 
     # -- components ---------------------------------------------------------------------------------------------------
     def attachment(self, name: str) -> MarkerHandle:
@@ -444,15 +440,11 @@ class Builder(ElementMethods):
         return str(about)
 
     # -- settings -------------------------------------------------------------------------------------------------
-    @property
-    def gravity(self) -> Any:
-        """Acceleration of gravity in ground axes (m/s^2), three values; assign others to change it."""
-        return self._description.values.get("gravity", (0, 0, 0))
-
-    @gravity.setter
-    def gravity(self, acceleration: Vector) -> None:
-        self._description.values["gravity"] = acceleration
-
+    gravity = _setting(
+        "gravity",
+        (0, 0, 0),
+        "Acceleration of gravity in ground axes (m/s^2), three values; assign others to change it.",
+    )
     initial = _settings(
         "initial",
         'Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``.',

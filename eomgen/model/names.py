@@ -196,13 +196,9 @@ class Namespace:
         if clash is not None:
             other = f"{self.kinds[clash]} at {self.places[clash]}"
             own = "" if clash == name else f", and {clash!r} is the rate of {name!r}"
-            self.faults.add(
-                path,
-                f"the name {clash!r} is already used by the {other}{own}",
-                "parameters, inputs, functions, coordinates, states, outputs and events share one namespace, with the "
-                "_dot and _ddot of coordinates; rename one",
-                "EG-NAME-TAKEN",
-            )
+            message = f"the name {clash!r} is already used by the {other}{own}"
+            remedy = "parameters, inputs, functions, coordinates, states, outputs and events share one namespace, with "
+            self.faults.add(path, message, f"{remedy}the _dot and _ddot of coordinates; rename one", "EG-NAME-TAKEN")
             return False
         return True
 
@@ -281,12 +277,10 @@ class Scope:
     def _read(self, output: str) -> Expr:
         """The expression of an output."""
         result = self.output(output)
-        for name, what in names_of_acceleration(self.names, symbols_of([result])) if self.level < OUTPUT else ():
-            message = f"the output {output!r} depends on the {what} {name!r}, which cannot be used here"
-            self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
-        energies = {f"{energy}()" for energy in ENERGIES} & symbols_of([result])
-        for name in sorted(energies) if self.level < OUTPUT else ():
-            message = f"the output {output!r} depends on {name.removesuffix('()')!r}, which cannot be used here"
+        used = symbols_of([result]) if self.level < OUTPUT else set()
+        late = [f"the {what} {name!r}" for name, what in names_of_acceleration(self.names, used)]
+        for what in (*late, *(repr(energy) for energy in sorted(ENERGIES) if f"{energy}()" in used)):
+            message = f"the output {output!r} depends on {what}, which cannot be used here"
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
         return result
 

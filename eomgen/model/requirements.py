@@ -68,11 +68,8 @@ class Requirements:
         """Keep a rule for late values, where any of the numbers depends on parameters, and on nothing else."""
         names = symbols_of(expressions) - {*local}
         if names and names <= self.parameters:
-            self.all.append(
-                Requirement(
-                    as_written(path, self.faults.written_paths), rule, tuple(expressions), tuple(data), tuple(local)
-                )
-            )
+            path = as_written(path, self.faults.written_paths)
+            self.all.append(Requirement(path, rule, tuple(expressions), tuple(data), tuple(local)))
 
     def known(self, expressions: Sequence[Expr], points: Mapping[str, Array] | None = None) -> Array | None:
         """Numbers, a row each, at the declared values and at points of local names; None if these do not tell."""

@@ -172,34 +172,31 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
         raise ExpressionError(str(error.args[0]).replace("\n", "; ")) from None
 
 
-def _parts(expressions: list[Any]) -> Iterator[Any]:
-    """Every part of the SymPy expressions among the values."""
-    for expression in expressions:
-        if is_sympy(expression):
-            yield from parts_of(expression)
+def _names(expressions: list[Any], kind: Any, name: Callable[[Any], str | None]) -> list[str]:
+    """Names of all parts of a class in the SymPy expressions among the values, sorted."""
+    parts = (part for x in expressions if is_sympy(x) for part in parts_of(x) if isinstance(part, kind))
+    return sorted({*filter(None, map(name, parts))})
 
 
 def free_names(expressions: list[Any]) -> list[str]:
     """Names of all symbols in SymPy expressions, the time excepted, sorted."""
     import sympy
 
-    return sorted({part.name for part in _parts(expressions) if isinstance(part, sympy.Symbol)} - {"t"})
+    return [name for name in _names(expressions, sympy.Symbol, sympy_name) if name != "t"]
 
 
 def function_names(expressions: list[Any]) -> list[str]:
     """Names of all functions of time in SymPy expressions, sorted."""
     from sympy.core.function import AppliedUndef
 
-    calls = (part for part in _parts(expressions) if isinstance(part, AppliedUndef))
-    return sorted({name for call in calls if (name := function_name(call))})
+    return _names(expressions, AppliedUndef, function_name)
 
 
 def derivative_names(expressions: list[Any]) -> list[str]:
     """Names of all derivatives of functions of time in SymPy expressions, sorted."""
     import sympy
 
-    slopes = (part for part in _parts(expressions) if isinstance(part, sympy.Derivative))
-    return sorted({name for slope in slopes if (name := function_name(slope))})
+    return _names(expressions, sympy.Derivative, function_name)
 
 
 # -- names and texts ---------------------------------------------------------------------------------------------------

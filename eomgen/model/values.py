@@ -275,11 +275,16 @@ class Reader:
         self, path: str, value: Any, count: int, kind: kinds.Field | type[kinds.Field], level: int = CONSTANT
     ) -> list[Expr] | None:
         """So many scalars; None if it is no such list."""
+        parts = self.parts(path, value, count, kind)
+        return None if parts is None else [self.expression(f"{path}[{k}]", x, level) for k, x in enumerate(parts)]
+
+    def parts(self, path: str, value: Any, count: int, kind: kinds.Field | type[kinds.Field]) -> list[Any] | None:
+        """The items of a list of so many; None, and a fault, if it is none."""
         parts = items(value)
         if parts is None or len(parts) != count:
             self.wrong(path, value, kind)
             return None
-        return [self.expression(f"{path}[{k}]", part, level) for k, part in enumerate(parts)]
+        return parts
 
     # -- frames and markers ---------------------------------------------------------------------------------------
     def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
@@ -370,18 +375,16 @@ class Reader:
 
     def pair(self, path: str, value: Any) -> tuple[Marker, Marker] | None:
         """Two markers; None if either is unknown."""
-        parts = items(value)
-        if parts is None or len(parts) != 2:
-            self.wrong(path, value, kinds.Pair)
+        parts = self.parts(path, value, 2, kinds.Pair)
+        if parts is None:
             return None
         first, second = (self.marker(f"{path}[{k}]", part) for k, part in enumerate(parts))
         return None if first is None or second is None else (first, second)
 
     def axes(self, path: str, value: Any) -> Columns:
         """Columns of the turn that brings x and y to two directions at right angles."""
-        parts = items(value)
-        if parts is None or len(parts) != 2:
-            self.wrong(path, value, kinds.TwoAxes)
+        parts = self.parts(path, value, 2, kinds.TwoAxes)
+        if parts is None:
             return TURNS["z"]
         x, y = (self.axis(f"{path}[{k}]", part)[2] for k, part in enumerate(parts))
         if self.faults.under(path):

@@ -319,12 +319,8 @@ def _add_section(
                     description.lines[f"{place}.{key}"] = description.lines[place]
                 values = {key: raw}
             else:
-                faults.add(
-                    f"{start}{home or section}.{name}",
-                    f"is not {kinds.Table.says}",
-                    "write its keys as {key: value, ...}",
-                    "EG-TYPE",
-                )
+                path, remedy = f"{start}{home or section}.{name}", "write its keys as {key: value, ...}"
+                faults.add(path, f"is not {kinds.Table.says}", remedy, "EG-TYPE")
                 values = {}
         entry = description.add(section, name, values, fields_of(section, values), home, twice)
         entry.trusted, entry.folder = section == "functions" and origin.trusted, origin.folder
