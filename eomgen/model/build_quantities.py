@@ -66,8 +66,8 @@ def read_parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
 
 def read_input(reader: Reader, entry: DescribedEntry) -> Input:
     """The input of an entry, without its expression over time."""
-    value, *rest = _declared(reader, entry, "input", INPUT)
-    return Input(str(entry.name), value or 0.0, *rest)
+    value, unit, doc = _declared(reader, entry, "input", INPUT)
+    return Input(str(entry.name), value or 0.0, unit, doc)
 
 
 def _declared(reader: Reader, entry: DescribedEntry, kind: str, fields: Fields) -> tuple[float | None, str, str]:

@@ -265,7 +265,7 @@ class Builder(ElementMethods):
             raise incomplete(
                 "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
             )
-        raw = {"type": "native", "source": str(source), "function": function, "arguments": arguments}
+        raw: dict[str, Any] = {"type": "native", "source": str(source), "function": function, "arguments": arguments}
         raw |= {"derivatives": derivatives, "second_derivatives": second_derivatives, "python": fallback}
         self._add("functions", name, {key: value for key, value in raw.items() if value is not None})
         return sympy_function(name)
