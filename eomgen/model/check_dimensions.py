@@ -20,11 +20,10 @@ from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SP
 from ..elements.element_type import Law
 from ..elements.kinds import OUTPUT, Field
 from ..expr.core import Expr, Graph, reachable
-from .description import DescribedEntry, Description
+from .description import DescribedEntry, parent_of
 from .fields import EQUATIONS, LAGRANGIAN, MODEL, acts_on_length, fields_of
 from .mechanism import JointSpec, Output
 from .names import ENERGIES, RATES
-from .quantities import TURNING
 from .units import Unit, si_text, sound_unit
 from .values import Reader
 
@@ -39,6 +38,8 @@ _RATIOS = frozenset(
     sign * a / b * turn for sign in (1, -1) for a in (1, 2, 3, 4, 6, 8, 12) for b in (1, 2, 3, 4, 6, 8, 12)
     for turn in (1.0, math.pi, 1 / math.pi)
 )  # fmt: skip
+#: Path -> the section and the entry.
+_Places = dict[str, tuple[str, DescribedEntry | None]]
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 
 
@@ -67,10 +68,12 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
     kinds |= {j.name: j.joint.coordinates[0].kind for j in joints if len(j.coordinates) == 1}
     moved = {*kinds, *(j.name for j in joints)}
     wrong = _check_bindings(reader, check)
+    sections = [*reader.description.sections.items()][::-1]  # a joint before the lock that closes it
+    places: _Places = {entry.path: (section, entry) for section, entries in sections for entry in entries}
     for path, expression, local in reader.expressions:
         if reader.faults.under(path) or (wrong and _takes_in(reader, wrong, path, expression)):
             continue
-        section, entry, steps = _place(reader.description, path)
+        section, entry, steps = _place(places, path)
         field, values = _field(section, entry, steps)
 
         def length(row: Field, section: str = section, entry: Any = entry) -> bool:
@@ -140,8 +143,7 @@ def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Out
     names = _names(reader, reader.units, joints)
     turned = {c for j in joints for c, k in zip(j.coordinates, j.joint.coordinates, strict=True) if k.kind == "angle"}
     angles = {name + suffix for name in turned for suffix in RATES}
-    turns = {name: q.level in TURNING or (q.level < 2 and q.axis == 3) for name, q in reader.quantities.items()}
-    angles |= {name for name, turn in turns.items() if turn}
+    angles |= {name for name, quantity in reader.quantities.items() if quantity.turns}
     check = _Check(reader.graph, names)
     result = []
     for output in outputs:
@@ -193,15 +195,12 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
     return result | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 
-def _place(description: Description, path: str) -> tuple[str, DescribedEntry | None, list[Any]]:
+def _place(places: _Places, path: str) -> tuple[str, DescribedEntry | None, list[Any]]:
     """Section, entry and the keys and indices that follow, of the path of an expression."""
-    section = path.partition(".")[0]
-    for home in (section, *(["constraints"] if section == "joints" else [])):  # a weld that closes is a constraint
-        for entry in description.sections.get(home, ()):
-            own = entry.path
-            if path.startswith(own) and path[len(own) : len(own) + 1] in (".", "["):
-                return home, entry, _steps(path[len(own) :])
-    return section, None, _steps(path)
+    start = path
+    while start and start not in places:
+        start = parent_of(start)
+    return (*places.get(start, (path.partition(".")[0], None)), _steps(path[len(start) :]))
 
 
 def _steps(path: str) -> list[Any]:

@@ -53,13 +53,28 @@ ENTRIES = {
         BODY,
     ),
 }
+SAMPLED = ElementType(
+    "sampled",
+    "a state that is kept, and renewed at the times offset + k period: what a digital controller gives.  States of one "
+    "period and offset are renewed together, in the order of their declaration; each takes those before it at their "
+    "new values.  ``<name>_samples`` counts the samples and ``<name>_sampled`` is the event, for the first of them.",
+    {
+        "sampled": STATE["sampled"].replace(
+            doc="the new value, of what the rate of a state may depend on; without one the state keeps its value, "
+            "unless a run gives a function for it: ``simulate(controllers={name: f})``"
+        ),
+        **{key: STATE[key] for key in ("period", "offset")},
+        "initial": STATE["initial"].replace(doc="the value before the first sampling time", default=0.0),
+        **{key: STATE[key] for key in ("unit", "doc", "latex")},
+    },
+)
 
 
 def methods() -> dict[str, list[ElementType]]:
     """Section -> what its methods add."""
-    return {section: [one] for section, one in ENTRIES.items()} | {
-        s: [*types.values()] for s, types in ELEMENTS.items()
-    }
+    single = {section: [one] for section, one in ENTRIES.items()}
+    single["states"].append(SAMPLED)
+    return single | {section: [*types.values()] for section, types in ELEMENTS.items()}
 
 
 class ElementMethods(Described):

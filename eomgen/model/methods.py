@@ -79,7 +79,7 @@ def _arguments(element: ElementType, key: str, field: Field, later: bool) -> lis
         return [Argument("*between", key, kind, "Any", None, "Where it acts: one joint or coordinate, or two markers.")]
     if field.required and field.joins:
         return [Argument(name, key, "handle or str", "Any", Parameter.empty, doc) for name in element.ends]
-    return [Argument(key, key, kind, annotation, default, doc)]
+    return [Argument("value" if key == element.name else key, key, kind, annotation, default, doc)]
 
 
 def signature_of(element: ElementType) -> Signature:
@@ -175,6 +175,8 @@ def method_of(section: str, element: ElementType) -> Callable[..., Any]:
             bound.apply_defaults()
         raw = {key: value for key, value in bound.arguments.items() if value is not None or key in element.ends}
         name, raw = bound.arguments["name"], {key: x for key, x in raw.items() if key not in ("self", "name")}
+        if element.name in element.keys:
+            raw = {element.name if key == "value" else key: x for key, x in raw.items()}
         single = raw.pop("keys", {}) if laws else {}
         law, types = raw.get("law", {}), laws[0].types if laws and laws[0].required else None
         if types and not isinstance(law, Mapping) and not (isinstance(law, str) and law in types):

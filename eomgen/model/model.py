@@ -176,42 +176,7 @@ class Builder(ElementMethods):
         "potential_energy", "The potential energy of gravity and springs, as a SymPy symbol for outputs."
     )
 
-    # -- states and functions -----------------------------------------------------------------------------------------
-    def sampled(
-        self, name: str, value: Any = None, period: Any = None, *, offset: Any = 0.0, initial: Any = 0.0,
-        unit: str = "", doc: str = "", latex: str = "",
-    ) -> Any:  # fmt: skip
-        """Declare a state that is held, and renewed at the times offset + k period: what a digital controller gives.
-
-        States of one period and offset are renewed together, in the order of their declaration; each takes those
-        before it at their new values.
-
-        Parameters
-        ----------
-        name : str
-            Identifier; ``<name>_samples`` counts the samples and ``<name>_sampled`` is the event, for the first state
-            of each period and offset.
-        value : number, str or SymPy expression
-            The new value, of what the rate of a :meth:`state` may depend on.  Without one the state keeps its value,
-            unless a run gives a function for it: ``simulate(controllers={name: f})``.
-        period : number, str or SymPy expression
-            Time from one sampling time to the next (s), of parameters, if an expression.
-        offset : number, str or SymPy expression, optional
-            A sampling time (s), 0 unless given.
-        initial : number, str or SymPy expression, optional
-            The value before the first sampling time.
-        unit, doc, latex : str, optional
-            Those of :meth:`state`.
-
-        Returns
-        -------
-        sympy.Symbol
-        """
-        raw = {"sampled": value, "period": period, "offset": offset, "initial": initial}
-        raw |= {key: text for key, text in (("unit", unit), ("doc", doc), ("latex", latex)) if text != ""}
-        self._add("states", name, {key: x for key, x in raw.items() if x is not None})
-        return symbol(name)
-
+    # -- functions ----------------------------------------------------------------------------------------------------
     @checked_keywords
     def native(
         self,

@@ -300,31 +300,16 @@ class Scope:
         seen = named
         if axis == 4 and named.origin == COM:  # a distance is the same from either end
             seen = named._replace(of=named.origin, origin=named.of)
-        point = self._point(seen)
-        origin, axes = (self._fixed(label) if label else None for label in (seen.origin, seen.axes))
+        of_all = COM if COM not in self.reader.bodies else None
+        if seen.of == of_all and (named.name in ONE_OR_TWO or named.level in TURNING):
+            raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
+        point = None if seen.of == of_all else self.marker(seen.of)
+        if of_all in (seen.origin, seen.axes):
+            remedy = "give a marker of a body here; com can be a marker of distance() and the first of x()"
+            raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy)
+        origin, axes = (self.marker(label) if label else None for label in (seen.origin, seen.axes))
         self.reader.quantities[str(named)] = Quantity(point, level, axis, origin, axes)
         return self.graph.symbol(str(named))
-
-    def _fixed(self, label: str) -> Marker:
-        """The marker of a label that is not a centre of mass."""
-        try:
-            return self.marker(label)
-        except ExpressionError:
-            if label == COM:
-                remedy = "give a marker of a body here; com can be a marker of distance() and the first of x()"
-                raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy) from None
-            raise
-
-    def _point(self, named: Named) -> Marker | None:
-        """The marker of a quantity; None for the centre of mass of all bodies."""
-        try:
-            return self.marker(named.of)
-        except ExpressionError:
-            if named.of != COM:
-                raise
-        if named.name in ONE_OR_TWO or named.level in TURNING:
-            raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
-        return None
 
     def _refuse(self, name: str, kind: str) -> None:
         remedy = f"only {_LEVEL_REMEDY[self.level]}"

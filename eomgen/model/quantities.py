@@ -110,6 +110,11 @@ class Quantity:
         return dimension_of(self.level, self.axis)
 
     @property
+    def turns(self) -> bool:
+        """Whether it is an angle or a rate of one."""
+        return self.level in TURNING or (self.level < 2 and self.axis == 3)
+
+    @property
     def order(self) -> int | None:
         """How many times the place is differentiated in it: 0, 1 or 2; None of the mass, which does not move."""
         if self.level == MASS:

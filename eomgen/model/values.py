@@ -33,7 +33,7 @@ from .expressions import parse
 from .mechanism import Body, JointSpec
 from .names import ENERGIES, RATES, WHOLE, Namespace, Scope, join_surrogates, lone_surrogate, nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
-from .quantities import TURNING, Named, Quantity
+from .quantities import Named, Quantity
 from .requirements import Requirements
 from .sympy_face import is_sympy, lower_sympy, name_of, named
 from .units import Unit
@@ -75,30 +75,18 @@ class Reader:
         self.added: tuple[list[Body], list[JointSpec]] = [], []  # what contacts add
 
     def ask(self, quantity: Named, path: str) -> None:
-        """Note that an expression uses what a force element does; ExpressionError if there is none of that name."""
+        """Note that an expression uses what an element does; ExpressionError if there is none of that name."""
+        what, listed, places = "force element", "elements", ["forces"]
         if quantity.is_reaction:
-            self._ask_reaction(quantity)
-            self.requested.setdefault(quantity, path)
-            return
-        names = [str(entry.name) for entry in self.description.sections["forces"]]
-        if quantity.of not in names:
-            raise ExpressionError(
-                f"no force element {quantity.of!r}", 0, nearest(quantity.of, names, "elements"), code="EG-NAME-UNKNOWN"
-            )
-        for label in (quantity.on, quantity.axes):
-            if label:
-                self.moving(label)
-        self.requested.setdefault(quantity, path)
-
-    def _ask_reaction(self, quantity: Named) -> None:
-        """Refuse the reaction of an unknown joint, or the multiplier of an unknown element."""
-        places = ("joints",) if quantity.part else ("constraints", "joints")
+            what, listed, places = "constraint or joint", "known", ["constraints", "joints"]
+        if quantity.is_reaction and quantity.part:
+            what, places = "joint", ["joints"]
         names = [str(entry.name) for place in places for entry in self.description.sections[place]]
-        if quantity.owner not in names:
-            message = f"no {'joint' if quantity.part else 'constraint or joint'} {quantity.owner!r}"
-            raise ExpressionError(message, 0, nearest(quantity.owner, names, "known"), code="EG-NAME-UNKNOWN")
-        if quantity.axes:
-            self.moving(quantity.axes)
+        if (name := quantity.owner) not in names:
+            raise ExpressionError(f"no {what} {name!r}", 0, nearest(name, names, listed), code="EG-NAME-UNKNOWN")
+        for label in filter(None, (quantity.on, quantity.axes)):
+            self.moving(label)
+        self.requested.setdefault(quantity, path)
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""
@@ -243,16 +231,15 @@ class Reader:
 
     def meaning(self, name: str) -> Meaning:
         """What a name in an expression stands for."""
-        kind, place = self.names.kinds.get(name, ""), self.quantities.get(name)
+        kind, place, named = self.names.kinds.get(name, ""), self.quantities.get(name), Named.parse(name)
         if place is not None:
-            turns = place.level in TURNING or (place.axis == 3 and place.level < 2)
-            return Meaning("marker", place.order, "angle" if turns else "length")
+            return Meaning("marker", place.order, "angle" if place.turns else "length")
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
-        if (requested := Named.parse(name)) is not None and requested.is_reaction:
-            return Meaning("reaction" if requested.part else "multiplier")
-        if requested is not None:  # whether a force moves with velocities is known once its law is
-            return Meaning("element", 1 if requested.name == "rate" else 0, "length")
+        if named is not None and named.is_reaction:
+            return Meaning("reaction" if named.part else "multiplier")
+        if named is not None:  # whether a force moves with velocities is known once its law is
+            return Meaning("element", 1 if named.name == "rate" else 0, "length")
         if kind not in _LEVELS:
             return Meaning(kind)
         level = _LEVELS[kind]
