@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..base.limits.numbers import COMPUTED, TENSOR, TENSOR_TERMS
 from ..base.value_rules import BODIES, EXCESS, NOT_NEGATIVE, SWITCH, inertia_scales, judge_bodies, longest_within
 from ..elements import kinds
 from ..elements.frames import GROUND, Frame
-from ..elements.kinds import DISPLAY, POINT, Vector
+from ..elements.kinds import DISPLAY, MARKER, POINT, Vector
 from ..elements.solids import SOLIDS, MassProperties, combine, measure_mesh, point
 from ..errors import UsageError
 from ..expr import vectors as vec
@@ -150,10 +150,10 @@ def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None, computed:
     return bool((known.any(axis=1) & (alike | ~known).all(axis=1)).all())
 
 
-def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[MassProperties]:
+def read_parts(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> list[MassProperties]:
     """Mass properties of the solids and points of a body; those with faults are left out."""
     parts: list[MassProperties] = []
-    for key, read in (("solids", _solid), ("points", _point)):
+    for key in ("solids", "points"):
         if key not in values:
             continue
         listed = items(values[key])
@@ -165,7 +165,7 @@ def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[Mas
             if not isinstance(raw, Mapping):
                 reader.wrong(place, raw, kinds.Table)
                 continue
-            part = read(reader, place, raw)
+            part = _solid(reader, name, place, raw) if key == "solids" else _point(reader, place, raw)
             if part is not None:
                 parts.append(part)
     return parts
@@ -179,7 +179,7 @@ def _point(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     return point(reader.graph, reader.expression(f"{path}.mass", values["mass"]), at)
 
 
-def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
+def _solid(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> MassProperties | None:
     faults, kind = reader.faults, reader.type_of(path, values, SOLID, "solid")
     if not kind:
         return None
@@ -192,9 +192,13 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     raw = {key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values}
     frame = _frame(reader, path, values)
     subtract = reader.flag(f"{path}.subtract", values["subtract"]) if "subtract" in values else False
-    own = _mesh(reader, path, values, raw.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
-    if own is None or faults.under(path):
+    read = _mesh(reader, path, values, raw.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
+    if read is None or faults.under(path):
         return None
+    own, sizes = read
+    if not subtract:
+        shape = BodyShape(reader.bodies[name], kind, sizes, frame, str(values.get("file", "")))
+        reader.drawn["solids", name].append(shape)
     mass = raw["mass"] if "mass" in raw else raw[density] * own.mass
     if subtract:
         mass = -mass
@@ -211,8 +215,10 @@ def _frame(reader: Reader, path: str, values: Mapping[str, Any]) -> Frame:
     return frame if columns == TURNS["z"] else frame.turned(turn_matrix(reader.graph, columns))
 
 
-def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> MassProperties | None:
-    """What a solid has at density 1, its inertia for each kg, in its own axes."""
+def _shape(
+    reader: Reader, path: str, kind: str, values: Mapping[str, Any]
+) -> tuple[MassProperties, tuple[Expr, ...]] | None:
+    """What a solid has at density 1, its inertia for each kg, in its own axes; and its sizes."""
     solid, graph = SOLIDS[kind], reader.graph
     lengths: dict[str, Any] = {}
     for key, dimension in solid.dimensions.items():
@@ -229,10 +235,19 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
         reader.requirements.in_order(f"{path}.inner_radius", inner, outer, message, remedy)
     made, o = solid(**lengths), graph.zero
     a, b, c = map(graph.lift, made.gyration())
-    return MassProperties(made.content(), (o, o, graph.lift(made.centre())), ((a, o, o), (o, b, o), (o, o, c)))
+    sizes = _in_a_row(x for key, x in lengths.items() if key != "inner_radius")
+    own = MassProperties(made.content(), (o, o, graph.lift(made.centre())), ((a, o, o), (o, b, o), (o, o, c)))
+    return own, sizes
 
 
-def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | None) -> MassProperties | None:
+def _in_a_row(values: Iterable[Any]) -> tuple[Expr, ...]:
+    """Sizes that are numbers, or three of them, one after the other."""
+    return tuple(x for value in values for x in (value if isinstance(value, tuple) else (value,)))
+
+
+def _mesh(
+    reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | None
+) -> tuple[MassProperties, tuple[Expr, ...]] | None:
     """The same of the solid that a mesh bounds."""
     if values.get("file") is None:
         return None
@@ -256,7 +271,7 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
     one = graph.one if scale is None else scale
     x, y, z = (tuple(graph.constant(v / result.volume) * one * one for v in row) for row in result.inertia)
     centre = vec.scale(one, vec.vector(graph, result.centre))
-    return MassProperties(result.volume * one * one * one, centre, (x, y, z))  # type: ignore[arg-type]
+    return MassProperties(result.volume * one * one * one, centre, (x, y, z)), (one,) * 3  # type: ignore[arg-type]
 
 
 def _locate(reader: Reader, file: str) -> str:
@@ -267,67 +282,26 @@ def _locate(reader: Reader, file: str) -> str:
 
 #: Sizes of the shapes of ``display``, in the order of a BodyShape's.
 SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"), "sphere": ("radius",)}
-
-
-def read_body_shapes(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> list[BodyShape]:
-    """Shapes of one body, where its description has no faults; ``display`` comes first, as solids are for the mass."""
-    for key, read in (("display", _displayed), ("solids", _solid_shape)):
-        raw = enumerate(items(values.get(key, ())) or ())
-        made = [read(reader, f"{path}.{key}[{k}]", body, one) for k, one in raw if not one.get("subtract")]
-        if shapes := [shape for shape in made if shape is not None]:
-            return shapes
-    return []
-
-
-def _sizes(reader: Reader, path: str, values: Mapping[str, Any], keys: tuple[str, ...]) -> tuple[Expr, ...]:
-    result: list[Expr] = []
-    for key in keys:
-        if items(values[key]) is not None:
-            result += reader.vector(f"{path}.{key}", values[key])
-        else:
-            result.append(reader.expression(f"{path}.{key}", values[key]))
-    return tuple(result)
-
-
-def _displayed(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
-    kind, frame, color = str(values.get("shape")), reader.frame(path, values), str(values.get("color", ""))
-    if kind == "mesh":
-        scale = _sizes(reader, path, values, ("scale",)) if "scale" in values else (reader.graph.one,) * 3
-        return BodyShape(body, kind, scale, frame, str(values.get("file", "")), color)
-    keys = SIZES.get(kind, ())
-    if not keys or any(key not in values for key in keys):
-        return None
-    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame, color=color)
-
-
-def _solid_shape(reader: Reader, path: str, body: int, values: Mapping[str, Any]) -> BodyShape | None:
-    kind, frame = str(values.get("type")), _frame(reader, path, values)
-    if kind == "mesh":
-        scale = reader.expression(f"{path}.scale", values["scale"]) if "scale" in values else reader.graph.one
-        return BodyShape(body, kind, (scale,) * 3, frame, str(values.get("file", "")))
-    keys = tuple(key for key in SOLIDS[kind].dimensions if key != "inner_radius")
-    return BodyShape(body, kind, _sizes(reader, path, values, keys), frame)
-
-
+SIZES["mesh"] = ("scale",)
 _COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
-def check_display(reader: Reader, path: str, raw: Any) -> None:
-    """Note faults of the shapes of a body; the files they name are not looked for."""
-    listed = items(raw)
+def read_display(reader: Reader, name: str, path: str, raw: Any) -> None:
+    """Read the shapes of a body; the files they name are not looked for."""
+    listed, one = items(raw), reader.graph.one
     if listed is None:
         reader.wrong(path, raw, kinds.Display)
-        return
-    for k, shape in enumerate(listed):
+    for k, shape in enumerate(listed or ()):
         place = f"{path}[{k}]"
         if not isinstance(shape, Mapping):
             reader.wrong(place, shape, kinds.Display)
             continue
         check_keys(place, shape, DISPLAY, reader.faults)
+        sizes: dict[str, Any] = {"scale": (one, one, one)}
         for key, value in shape.items():
-            if key not in DISPLAY:
+            if key not in DISPLAY or key in MARKER:
                 continue
-            result = DISPLAY[key].read(reader, f"{place}.{key}", value)
+            sizes[key] = result = DISPLAY[key].read(reader, f"{place}.{key}", value)
             if key == "scale" and any(x.is_zero for x in result):
                 remedy = "give three numbers other than 0; negative ones mirror"
                 message = "a scale of 0 leaves nothing of the mesh"
@@ -335,6 +309,11 @@ def check_display(reader: Reader, path: str, raw: Any) -> None:
             if key == "color" and not (isinstance(value, str) and _COLOR.fullmatch(value)):
                 remedy = 'give six hexadecimal digits: "#1f77b4"'
                 reader.fault(f"{place}.{key}", f"{value!r} is no color", remedy, "EG-TYPE")
+        frame, kind, color = reader.frame(place, shape), str(shape.get("shape")), str(shape.get("color", ""))
+        file = str(shape.get("file", "")) if kind == "mesh" else ""
+        if (keys := SIZES.get(kind)) and all(key in sizes for key in keys):
+            size = _in_a_row(sizes[key] for key in keys)
+            reader.drawn["display", name].append(BodyShape(reader.bodies[name], kind, size, frame, file, color))
 
 
 #: Keys of which a body has one at most.
@@ -355,7 +334,7 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
             faults.add(f"{path}.{key}", "is given without an inertia", "give inertia or principal too", "EG-MISSING")
     if "check_inertia" in values:
         check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
-    parts = read_parts(reader, path, values)
+    parts = read_parts(reader, entry.name, path, values)
     own = [key for key in OWN if key in values]
     if "solids" in values and own:
         for key in own:

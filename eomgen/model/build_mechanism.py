@@ -14,7 +14,7 @@ from ..elements.frames import GROUND, Frame, Marker
 from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
-from .bodies import check_bodies, check_display, read_body, read_body_shapes
+from .bodies import check_bodies, read_body, read_display
 from .build_elements import (
     build_elements,
     build_joints,
@@ -191,7 +191,7 @@ def build(description: Description) -> Mechanism:
             body_shapes=tuple(
                 shape
                 for entry in sections["bodies"]
-                for shape in read_body_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
+                for shape in reader.drawn["display", entry.name] or reader.drawn["solids", entry.name]
             ),
             added_bodies=tuple(range(described, len(bodies))),
         ),
@@ -217,7 +217,7 @@ def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
         if not faults.under(entry.path):
             check_keys(entry.path, entry.values, GROUND_FIELDS if entry.name == GROUND_NAME else BODY, faults)
         if "display" in entry.values:
-            check_display(reader, f"{entry.path}.display", entry.values["display"])
+            read_display(reader, entry.name, f"{entry.path}.display", entry.values["display"])
     origin = Frame(reader.identity, vec.zero(graph))
     for name, index in reader.bodies.items():
         reader.markers[name] = Marker(index, origin, name)

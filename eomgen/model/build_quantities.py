@@ -23,11 +23,9 @@ from .description import DescribedEntry, items
 from .fields import EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, STATE
 from .mechanism import Clock, Event, FirstOrderState, Input, Output, Parameter, Switched
 from .names import names_of_acceleration, nearest
-from .quantities import VELOCITIES, Named
 from .sympy_face import in_order
 from .units import Unit, UnitError, read_unit
 from .values import Reader, is_number, take_latex
-from .visit import motions_of, names_of
 
 
 def read_described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[Unit, str]:
@@ -154,19 +152,7 @@ class Outputs:
                 remedy = f"leave the unit out, or give the output in {unit.text} another name"
                 faults.add(f"{path}.unit", f"{entry.name!r} is a {kind}, which is in SI units", remedy, "EG-UNIT")
         raw = expression / unit.size if unit.size != 1.0 else expression
-        return Output(str(entry.name), raw, unit.text, doc, self._of_velocities(entry, expression)), expression
-
-    def _of_velocities(self, entry: DescribedEntry, expression: Expr) -> bool:
-        """Whether an output is written with velocities, also where they cancel, as in ``0*vx(b) - 2``."""
-        text, kinds = entry.values.get("expression"), self._reader.names.kinds
-        names = {*symbols_of([expression]), *names_of(text)}
-        motions = [*filter(None, map(Named.parse, names)), *motions_of(text)]
-        outputs = [k for k in (self._places[name] for name in names if name in self._places) if k not in self._open]
-        return (
-            any(motion.level in VELOCITIES for motion in motions)
-            or any(kinds.get(name) in ("velocity", "rate") for name in names)
-            or any(self._at(k)[0].of_velocities for k in outputs)
-        )
+        return Output(str(entry.name), raw, unit.text, doc, f"{path}.expression" in reader.of_velocities), expression
 
 
 #: Kinds of names that an output may repeat.

@@ -17,7 +17,18 @@ from ..errors import ExpressionError
 from ..expr.core import Expr, Graph, symbols_of
 from ..expr.texts import quoted
 from .description import Faults
-from .quantities import ACCELERATIONS, COM, ONE_OR_TWO, QUANTITIES, TOTALS, TURNING, Named, Quantity, call_of
+from .quantities import (
+    ACCELERATIONS,
+    COM,
+    ONE_OR_TWO,
+    QUANTITIES,
+    TOTALS,
+    TURNING,
+    VELOCITIES,
+    Named,
+    Quantity,
+    call_of,
+)
 
 #: Arguments that a function of any number of them takes at most.
 MOST = 64
@@ -272,11 +283,15 @@ class Scope:
             self._refuse(name, kind)
         elif kind == "output":
             return self._read(name)
+        elif kind in ("velocity", "rate"):
+            self.reader.of_velocities.add(self.path)
         return self.graph.symbol(name)
 
     def _read(self, output: str) -> Expr:
         """The expression of an output."""
         result = self.output(output)
+        if f"{self.names.places[output]}.expression" in self.reader.of_velocities:
+            self.reader.of_velocities.add(self.path)
         used = symbols_of([result]) if self.level < OUTPUT else set()
         late = [f"the {what} {name!r}" for name, what in names_of_acceleration(self.names, used)]
         for what in (*late, *(repr(energy) for energy in sorted(ENERGIES) if f"{energy}()" in used)):
@@ -297,6 +312,8 @@ class Scope:
         if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
             self._refuse(str(named), "motion of a marker" if self.level < LAW else "acceleration of a marker")
             return self.graph.symbol(str(named))
+        if level in VELOCITIES:
+            self.reader.of_velocities.add(self.path)
         seen = named
         if axis == 4 and named.origin == COM:  # a distance is the same from either end
             seen = named._replace(of=named.origin, origin=named.of)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -30,7 +31,7 @@ from ..expr.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
-from .mechanism import Body, JointSpec
+from .mechanism import Body, BodyShape, JointSpec
 from .names import ENERGIES, RATES, WHOLE, Namespace, Scope, join_surrogates, lone_surrogate, nearest
 from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .quantities import Named, Quantity
@@ -60,6 +61,7 @@ class Reader:
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}  # by name, the index
         self.markers: dict[str, Marker] = {}  # named ones (``rod.tip``) and the bodies' own frames (``rod``)
         self.quantities: dict[str, Quantity] = {}  # motions of markers that expressions use
+        self.of_velocities: set[str] = set()  # paths of expressions that speak of velocities, also where these cancel
         self.requested: dict[Named, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
@@ -70,6 +72,8 @@ class Reader:
         self.shapes: Callable[[str, Any], Any] = lambda path, value: None  # of contacts between groups
         self.joints: Sequence[Any] = ()  # declared, with the names of their coordinates
         self.specs: Sequence[JointSpec] = ()  # the same, whose markers are read
+        #: Shapes of bodies in pictures, by ``display`` or ``solids`` and the name of the body.
+        self.drawn: defaultdict[tuple[str, str], list[BodyShape]] = defaultdict(list)
         self.mass_data: Sequence[Body] = ()  # bodies whose masses are read
         self.contacts: dict[str, str] = {}  # path of a cam -> the angle that finds its contact
         self.added: tuple[list[Body], list[JointSpec]] = [], []  # what contacts add

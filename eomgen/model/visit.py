@@ -51,13 +51,6 @@ def names_of(value: Any) -> set[str]:
     return {result[0] for result in _TOKEN.finditer(value) if result["name"]} if isinstance(value, str) else set()
 
 
-def motions_of(value: Any) -> set[Named]:
-    """Every motion of a marker in a text."""
-    tokens = _TOKEN.finditer(value) if isinstance(value, str) else ()
-    read = (Named.parse(result[0]) for result in tokens if result["quantity"])
-    return {quantity for quantity in read if quantity is not None and quantity.is_motion}
-
-
 class Visitor:
     """What a change does to each kind of value; nothing unless a method is overridden.
 
