@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ..base import texts
 from ..elements.joints import JOINTS
@@ -96,15 +96,7 @@ class JointReaction(Wrench):
         return self._replace(axes="")._part("normal")
 
 
-class Labelled(Protocol):
-    """A marker as texts call it."""
-
-    label: str
-
-    def note(self) -> None: ...
-
-
-def noted(marker: Labelled) -> str:
+def noted(marker: MarkerHandle) -> str:
     """The label of a marker whose motion an expression uses; UsageError if it is none."""
     if not hasattr(marker, "note"):
         raise ill_typed(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {texts.shown(marker)}")
@@ -145,7 +137,7 @@ class ForceHandle(ElementHandle):
     rate = _of_element("rate", "Rate of :attr:`length` (m/s or rad/s).")
     power = _of_element("power", "Power of everything that it exerts (W): positive where it drives the mechanism.")
 
-    def on(self, marker: Labelled, axes: Labelled | None = None) -> Wrench:
+    def on(self, marker: MarkerHandle, axes: MarkerHandle | None = None) -> Wrench:
         """Force and moment that it exerts on the body of a marker, in ground axes or along those of another marker.
 
         Parameters
