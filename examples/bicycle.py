@@ -15,7 +15,7 @@ WEAVE, CAPSIZE = 4.292382536341104, 6.024262015388359  # m/s (Meijaard, Papadopo
 
 def main() -> None:
     """Linearize the nonlinear model about straight rides, find where they are stable, and ride."""
-    module = eg.load(MODEL).compile(target="numpy")
+    module = eg.load(MODEL).compile()
 
     def matrices(v: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return module.linearize(module.x0(STRAIGHT, rear_dot=-v / RADIUS)).second_order("lean", "steer")

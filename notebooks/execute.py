@@ -1,7 +1,8 @@
 """Notebooks -> the same notebooks with the outputs of a fresh kernel: ``python notebooks/execute.py [--out DIR] [FILE ...]``.
 
 Without ``--out`` each notebook is stored where it lies; without files, all of this folder.  Each runs in an empty folder
-of its own.  What changes from run to run without meaning (times, versions, how text was cut into pieces) is not stored.
+of its own.  What changes from run to run without meaning (times, versions, how text was cut into pieces, notes of a slow
+compilation) is not stored.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ def joined(outputs: list[Any]) -> list[Any]:
     """The outputs of a cell; text of one stream that came in several pieces is one, and empty ones are left out."""
     kept: list[Any] = []
     for output in outputs:
-        if not "".join(output.get("data", {"": "something"}).values()):  # where a progress bar was
+        slow = output.get("name") == "stderr" and output.text.startswith("eomgen: compiling")
+        if slow or not "".join(output.get("data", {"": "something"}).values()):  # where a progress bar was
             continue
         last = kept[-1] if kept else None
         if output.output_type == "stream" and last is not None and last.get("name") == output.name:

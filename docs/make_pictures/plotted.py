@@ -241,6 +241,7 @@ def forms() -> Any:
         ax.bar_label(drawn, fmt="{:,.0f}", fontsize=7)
     ax.set_xticks(place + 0.2, [line[0] for line in found], fontsize=7)
     ax.set(ylabel="operations", yscale="log")
+    ax.margins(y=0.1)
     ax.legend(frameon=False, fontsize=8)
     return figure
 

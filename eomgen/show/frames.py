@@ -236,7 +236,8 @@ class Frames:
         for ax in self.figure.axes:
             ax.tick_params(labelsize=larger * TICKS)
             legend = [] if ax.get_legend() is None else ax.get_legend().get_texts()
-            for text in (*ax.texts, *legend, ax.title, ax.xaxis.label, ax.yaxis.label):
+            labels = [getattr(ax, f"{k}axis").label for k in ("xyz" if hasattr(ax, "zaxis") else "xy")]
+            for text in (*ax.texts, *legend, ax.title, *labels):
                 text.set_fontsize(larger * text.get_fontsize())
         self.canvas.draw()
         self.figure.set_layout_engine("none")

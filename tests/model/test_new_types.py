@@ -23,7 +23,6 @@ from eomgen.elements.kinds import MarkerReference, Scalar
 from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
 from eomgen.expr import vectors as vec
 from eomgen.expr.core import Expr, Graph
-from eomgen.expr.records import dataclass
 from eomgen.expr.vectors import Mat3, Vec3
 from eomgen.model import model_schema
 
@@ -38,7 +37,6 @@ class Percent(Scalar):
         return reader.graph.constant(reader.number(path, value, positive=True) or 1.0) / 100.0
 
 
-@dataclass(frozen=True)
 class HardeningSpring(PathForce):
     """Force -f (k s + k3 s^3) of the distance s."""
 
@@ -59,7 +57,6 @@ class HardeningSpring(PathForce):
         return [self.path.drawn(COIL, SPIRAL)]
 
 
-@dataclass(frozen=True)
 class Slanted(Joint):
     """S slides along z and, by ``slope``, along x of P.  Allows 1, removes 5."""
 
@@ -86,7 +83,6 @@ class Slanted(Joint):
         return [position[2]]
 
 
-@dataclass(frozen=True)
 class Level(Constraint):
     """A marker stays at a height over ground."""
 
