@@ -1,7 +1,5 @@
 """Models of the analyses beside those of ``models``, and modules of both that the tests of a process share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """A headless chromium led over its debugging protocol: pages are opened, clicked, looked at, and overheard."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import io
@@ -40,7 +38,7 @@ class Browser:
         self.complaints: list[str] = []
         self._number = 0
 
-    def __enter__(self) -> Browser:
+    def __enter__(self) -> "Browser":
         assert CHROMIUM is not None
         width, height = self.size
         words = [CHROMIUM, *FLAGS.split(), f"--user-data-dir={self.folder}", f"--window-size={width},{height}"]

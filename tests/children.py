@@ -3,8 +3,6 @@
 One left behind is found by the collector of garbage in some later test, and fails that.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The command ``eomgen`` called in this process: ``run("check", file)`` -> its exit code and what it wrote."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """What every test run shares: slow tests last, and ``--no-skips`` for the run that counts."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Scenes of contact between groups, and their geometry in NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple

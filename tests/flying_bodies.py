@@ -1,7 +1,5 @@
 """Free bodies in space whose contacts are judged, and the judges: slopes of the energy, depths by the energy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

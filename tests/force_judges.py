@@ -1,7 +1,5 @@
 """Judges of force elements: wrenches and twists made in NumPy, differences of rhs, the faults that a model reports."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

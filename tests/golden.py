@@ -8,8 +8,6 @@ differences of two recordings, relative to the largest entry of each quantity, a
 limit.  ``tests/core/recordings`` was recorded before the rebuilding; it is never made anew to hide a difference.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

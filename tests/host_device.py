@@ -1,7 +1,5 @@
 """A device in place of a GPU: the very text of the kernels compiled for the host, one state after the other."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import subprocess
@@ -38,7 +36,7 @@ class HostArray:
     def numpy(self) -> np.ndarray:
         return self.array.copy()
 
-    def reshaped(self, shape: Sequence[int]) -> HostArray:
+    def reshaped(self, shape: Sequence[int]) -> "HostArray":
         return HostArray(self.array.reshape(shape))
 
 

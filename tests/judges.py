@@ -4,8 +4,6 @@ Derivatives are central differences of tenth order, good to about 1e-13 of the f
 dense solves with the functions of a module that are formulas: M, h, C, C_q and C_q v + C_t.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any

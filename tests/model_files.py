@@ -1,7 +1,5 @@
 """Model files as a user has them: a text -> a model, its faults, and what a model looks like once it is written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Models that tests share: the shipped examples by name, variations on them, small ones of kinds that none is of."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import cache, partial

@@ -5,8 +5,6 @@ rate.  Our Euler parameters have the same velocities; our Euler angles x-y'-z'' 
 v = J v_ours and v' = J v'_ours + J' v_ours its equations become ours.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

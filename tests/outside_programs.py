@@ -1,7 +1,5 @@
 """Programs that some tests need and the README does not promise; run, it prints Debian's packages of those missing."""
 
-from __future__ import annotations
-
 import shutil
 
 #: Name in the mark ``needs(name)`` -> the commands it goes by, and Debian's packages.

@@ -1,7 +1,5 @@
 """Exported packages of target cython, made ready in their folder without pip: ``built(folder)`` compiles them there."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

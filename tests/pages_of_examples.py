@@ -5,8 +5,6 @@ drags by the mouse, what the console says and what it asks of the network.  FOLD
 wide and narrow, light and dark.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

@@ -5,8 +5,6 @@ free flyer, whose linear velocity is in body axes where ours is in ground axes: 
 v' = J v'_ours + J' v_ours its equations become ours.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter

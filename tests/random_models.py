@@ -1,7 +1,5 @@
 """Random mechanisms with mixed joints, planar and spatial, with loops, and the same numbers for judges from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """What a test demands of an error: its code, where in the model it is, and the names and numbers that it tells."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

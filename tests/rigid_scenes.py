@@ -1,7 +1,5 @@
 """Scenes of rigid contact."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """A robot against its judge: what the judge says of a state, and the largest differences over random states."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

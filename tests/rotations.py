@@ -1,7 +1,5 @@
 """Euler parameters in plain NumPy, written apart from eomgen: products of quaternions (scalar first)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

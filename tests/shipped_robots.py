@@ -1,7 +1,5 @@
 """Robots that PyPI packages ship: where they are, and the lists that tests and the benchmark go through."""
 
-from __future__ import annotations
-
 from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path

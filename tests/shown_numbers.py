@@ -1,7 +1,5 @@
 """What equations show, evaluated through SymPy at numbers: the other side of every comparison with a module."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Long sweeps over many alike cases: which of them run always, and which by ``make thorough`` alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Systems of SymPy's mechanics, built as its own tests and books build them, for use through from_sympy."""
 
-from __future__ import annotations
-
 from math import acos, atan2, cos, hypot, pi, sin
 from typing import Any
 

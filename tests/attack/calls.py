@@ -1,7 +1,5 @@
 """Calls of compiled modules with odd arguments: wrong shapes, types, names, sizes, numbers that are none."""
 
-from __future__ import annotations
-
 import contextlib
 import inspect
 import math

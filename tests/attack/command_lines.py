@@ -3,8 +3,6 @@
 No program may start here, so that compilers, if any, are named wrongly.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """Hostile texts where an expression is expected: the output of a small model, which is checked and at times compiled."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ in machine code is replaced.  What is found is printed with its seed, by which `
 Seeds below 0 are the cases in ``kept/``, which once were findings.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

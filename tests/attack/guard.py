@@ -5,8 +5,6 @@ the folder of the case and the cache; parsing texts as Python syntax, which runs
 installed; and running code that comes from those files.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys

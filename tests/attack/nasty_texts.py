@@ -1,7 +1,5 @@
 """Texts that end, join, escape or drive something in some language: each must stay a text wherever it is written."""
 
-from __future__ import annotations
-
 C = '\n#error "a text of the model is C"\n'
 PYTHON = "__import__('os').abort()"
 

@@ -3,8 +3,6 @@
 A file called ``secret`` lies beside the folder of the case.  What is in it must not come out, whatever a model says.
 """
 
-from __future__ import annotations
-
 import base64
 import copy
 import random

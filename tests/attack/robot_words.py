@@ -1,7 +1,5 @@
 """Robot files to start from, and what is put into them: elements, numbers, names of files, declarations."""
 
-from __future__ import annotations
-
 _BALL = '<worldbody><body name="a"><joint name="j"/><geom size="1"/></body></worldbody>'
 _SHAPE = '<worldbody><body name="a"><joint name="j1"/><geom type="mesh" mesh="m"/></body></worldbody>'
 BASES = {

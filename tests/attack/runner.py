@@ -4,8 +4,6 @@ A case is a text, or a tree of dicts, lists, texts and numbers that JSON can wri
 seed, and gives it to the package.
 """
 
-from __future__ import annotations
-
 import gc
 import importlib.metadata
 import json

@@ -1,7 +1,5 @@
 """Odd SymPy objects in every place where Python code may give an expression."""
 
-from __future__ import annotations
-
 import contextlib
 import random
 import warnings

@@ -1,7 +1,5 @@
 """A short attack of every kind, every case that once was a finding, and that the guard and the limits see what they must."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

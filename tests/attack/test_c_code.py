@@ -1,7 +1,5 @@
 """Exported C as compilers and sanitizers judge it: no warning, no state, no access beyond an array, no thread in the way."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

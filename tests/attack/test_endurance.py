@@ -1,7 +1,5 @@
 """Eight threads on one module at once give what one thread gives, bit by bit; many models leave nothing behind."""
 
-from __future__ import annotations
-
 import gc
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Every nasty text in every text field of a model, written in every language: it stays a text, and stays the same."""
 
-from __future__ import annotations
-
 import ast
 import html.parser
 import json

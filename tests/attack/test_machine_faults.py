@@ -5,8 +5,6 @@ and if the run after it, with the fault gone, gives the right number.  Anything 
 traceback, a crash, a hang.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import random

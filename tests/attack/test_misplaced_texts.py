@@ -1,7 +1,5 @@
 """Nasty texts where no text belongs: names, keys, expressions, words, files; each is refused by name and place."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

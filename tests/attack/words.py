@@ -1,7 +1,5 @@
 """Nasty texts, numbers and names that several kinds of cases use."""
 
-from __future__ import annotations
-
 from attack.nasty_texts import LONE, NASTY
 
 #: Words that mean something to Python, C, the generated code, a shell, a file system, YAML or the package.

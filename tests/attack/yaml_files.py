@@ -1,7 +1,5 @@
 """Hostile model files: the examples and the documents' models changed, models from the JSON Schema, broken YAML."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import random

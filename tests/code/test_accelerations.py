@@ -5,8 +5,6 @@ The model's functions are C in one case of each kind, else those of target numpy
 Judges: a solve with multipliers in NumPy, in which rotations go by SciPy; closed forms; differences of results.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple

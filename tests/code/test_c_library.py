@@ -4,8 +4,6 @@ Judges: the compiled module in double precision; gcc's own account of stack (-fc
 processors without an operating system, Debian's cross compilers and the emulators of qemu, where they are installed.
 """
 
-from __future__ import annotations
-
 import ctypes
 import re
 import subprocess

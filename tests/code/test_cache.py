@@ -3,8 +3,6 @@
 Tests with caches or compilers of their own build units of target fmu, or take a copy of a cache that was filled once.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import shutil

@@ -3,8 +3,6 @@
 That the functions are the module's is in test_targets.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import cache

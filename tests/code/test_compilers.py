@@ -1,7 +1,5 @@
 """Compilers that are missing, hang, print without end, lie or fail; options of the compilation."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -1,7 +1,5 @@
 """Functional mock-up units, judged by FMPy, which validates and simulates them; by the module; by sanitizers."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Batches of states in vectors and ensembles: compiled when first needed, to the same bits, and done without."""
 
-from __future__ import annotations
-
 import pickle
 import re
 import subprocess

@@ -4,8 +4,6 @@ NumPy's text has one statement for each operation; text in C that goes through a
 to grow less than the model.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Exported packages and wheels: they run with NumPy alone, say whence they are, test themselves, replace their own."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

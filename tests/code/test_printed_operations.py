@@ -3,8 +3,6 @@
 Judges: Python's ``math``, mpmath with 50 digits, quadrature.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

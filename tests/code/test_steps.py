@@ -3,8 +3,6 @@
 Right-hand sides of any form are written as first-order states; with six states and more, steps take four at a time.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -3,8 +3,6 @@
 Derivatives too: those that the libraries take of their functions are the module's own.
 """
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The benchmarks run, and operations are no more than the documentation states."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

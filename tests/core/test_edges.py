@@ -1,7 +1,5 @@
 """Edges: what outside examiners found wrong, one small case of each kind with what is right."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """Every error has a code, and its text is as it was when somebody last looked at it: ``messages.json``."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import re

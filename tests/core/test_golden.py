@@ -1,7 +1,5 @@
 """Golden recordings: every model of the registry computes what the version before the rebuilding computed."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

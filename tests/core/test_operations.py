@@ -4,8 +4,6 @@ The judge is SymPy with 30 digits.  An operation is reached as a user reaches it
 potentials (whose slopes are forces and whose second slopes are in Jacobians), of given equations and of outputs.
 """
 
-from __future__ import annotations
-
 import math
 import random
 import re

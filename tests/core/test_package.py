@@ -1,7 +1,5 @@
 """The package as people install and import it: its names, what it loads, the wheel, a clone."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

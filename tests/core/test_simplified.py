@@ -1,7 +1,5 @@
 """Equations are shown as a hand would write them: equal, joined, factored, and no longer than in a textbook."""
 
-from __future__ import annotations
-
 import statistics
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Types that a checker sees in a user's file, outside the package: results are named classes, not Any."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Creep of wheel and rail: the linear wheelset beside textbook matrices, saturation beside published formulas."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws of dry friction: published formulas, angles of slip, creep, stick-slip and bristles under changing loads."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

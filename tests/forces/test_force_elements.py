@@ -1,7 +1,5 @@
 """Force elements against closed forms and wrenches made in NumPy: loads, energy, power, derivatives, faults."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Friction by the reaction of a joint, against Newton's and Euler's equations of single bodies, solved by SciPy."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws, outputs and events that depend on motions of markers, on outputs and on forces of elements; roots at rest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Motions with force elements against closed forms: orbits, impacts, rolling, slopes, stick and slip, libration."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

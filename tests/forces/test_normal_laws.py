@@ -1,7 +1,5 @@
 """Laws of the normal force: published times and restitutions of impacts, never a pull, groups as single contacts."""
 
-from __future__ import annotations
-
 from math import gamma
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Paths over via points and around cylinders, with friction or not; judged by closed forms, SymPy and a search."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

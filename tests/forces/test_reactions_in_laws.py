@@ -1,7 +1,5 @@
 """Reactions of joints and multipliers of equations in laws, outputs and events, against closed forms."""
 
-from __future__ import annotations
-
 from itertools import permutations
 from pathlib import Path
 

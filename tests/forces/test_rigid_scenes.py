@@ -1,7 +1,5 @@
 """Rigid contacts of free bodies: impulses never give energy and keep both momenta; laws too, in any order of groups."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Soil under plates and wheels: sinkage, unloading, shear, drawbar against closed forms and published numbers."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """Soil that remembers by place: ruts, the second pass, shear and energy against closed forms, drives."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

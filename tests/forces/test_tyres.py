@@ -1,7 +1,5 @@
 """Tyres: the brush model and the Magic Formula against formulas written anew, power, cornering, standstill."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Each model is derived and compiled once for all tests of mechanics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

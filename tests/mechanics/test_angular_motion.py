@@ -1,7 +1,5 @@
 """Angular velocities and accelerations: closed forms, Pinocchio, Newton and Euler; equations of them that hold."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

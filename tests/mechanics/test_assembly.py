@@ -1,7 +1,5 @@
 """Assembly: the branch nearest to a guess, what a guess leaves open, and angles that must not wrap."""
 
-from __future__ import annotations
-
 from math import acos, atan2, cos, hypot, pi, radians, sin, sqrt
 
 import numpy as np

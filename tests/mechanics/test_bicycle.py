@@ -1,7 +1,5 @@
 """The Carvallo-Whipple bicycle, of examples/bicycle.yaml and with a free frame, against what is published of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Where branches meet: starts at change points, dead centres without inertia, positions that rounding does not tell."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cams: laws of lift against closed forms, contact with contours against numeric searches for the contact point."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

@@ -1,7 +1,5 @@
 """At and beside change points: the same motion without the singularity, 50 digits, branches, runs through them."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Slider-crank and four-bar over a full turn against closed forms, to 1e-10 of the largest value of each quantity."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

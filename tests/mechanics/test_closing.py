@@ -1,7 +1,5 @@
 """Constraints and joints that close and open: momenta, a published walker, impacts solved with NumPy, derivatives."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

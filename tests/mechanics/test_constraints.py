@@ -1,7 +1,5 @@
 """The constraints section: the same from Python and from a file, faults by line, equations that can be held."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The same mechanism with a joint in the tree and with the joint cut: equal accelerations, counts as in the book."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

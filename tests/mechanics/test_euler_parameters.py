@@ -1,7 +1,5 @@
 """Euler parameters: Jacobi's elliptic functions, loops as in Euler angles, singular angles, and what is no state."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import judges

@@ -1,7 +1,5 @@
 """Augmented with stabilisation, canonical and differential-algebraic forms, reactions: closed forms and IDA."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import judges

@@ -1,7 +1,5 @@
 """Gears, planetary sets, racks and belts against closed forms, and against the velocities of the points that mesh."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

@@ -1,7 +1,5 @@
 """Gyroscopes, a gyrostat and a reaction wheel against closed forms: heavy_top.json and spacecraft_analytic.json."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

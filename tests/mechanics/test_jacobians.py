@@ -1,7 +1,5 @@
 """``jacobian`` is the derivative of the complete ``rhs``, its projection included, in every direction of x."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 from typing import Any

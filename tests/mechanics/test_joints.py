@@ -1,7 +1,5 @@
 """Joints: histories of MSC ADAMS, shafts, threads and guides, pairs of axes, moving guides in closed form."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

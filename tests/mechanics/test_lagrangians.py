@@ -1,7 +1,5 @@
 """A bare Lagrangian that depends on time, on inputs, with dissipation and gyroscopic terms: closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import sympy

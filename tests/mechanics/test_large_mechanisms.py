@@ -1,7 +1,5 @@
 """Shipped mechanisms with several loops, in the plane and in space: references, closed forms, loops and energy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

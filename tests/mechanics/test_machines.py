@@ -1,7 +1,5 @@
 """Machines of the gallery beside closed forms, published equations, circles cut by hand and SymPy's muscles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise

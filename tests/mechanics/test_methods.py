@@ -1,7 +1,5 @@
 """All methods agree, and each alone with rigid bodies from differences of poses and multipliers, in NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 from typing import Any

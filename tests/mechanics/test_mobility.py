@@ -1,7 +1,5 @@
 """Mobility: rank, freedoms, redundant rows by name, candidates, contradictions; what is said of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Nonholonomic constraints of a bare Lagrangian: a skate's cycloid, rows of both levels that move, what is refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers far apart and at the ends of the range: digits kept, indefinite inertia, lengths by a hair, named errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

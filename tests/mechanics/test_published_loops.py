@@ -1,7 +1,5 @@
 """Loops against published answers and closed forms: squeezer, slider-cranks, four-bar, inversor; the minimal form."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

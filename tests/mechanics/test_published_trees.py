@@ -1,7 +1,5 @@
 """Pendula, chains, a robot and a manipulator against closed forms, high-precision integrations and published values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import cos, pi, sin

@@ -4,8 +4,6 @@ M, h, power and twists are those of differences of body poses, loops are closed 
 Computational Dynamics, sec. 5.6) in NumPy, redundant rows and Euler parameters included.
 """
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest

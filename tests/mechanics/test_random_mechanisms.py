@@ -3,8 +3,6 @@
 Thirty mechanisms of each property run always, a thousand by ``make thorough``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache

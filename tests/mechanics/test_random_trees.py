@@ -1,7 +1,5 @@
 """Random trees of every joint type by every method: Pinocchio, Newton and Euler from poses, power."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Planar loops made of spatial joints: redundant rows are named and harmless; assembly says what it cannot do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Wheels, balls, blades and convex bodies that roll: closed forms, a published disc and a published rattleback."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

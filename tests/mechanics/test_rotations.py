@@ -1,7 +1,5 @@
 """Rotations against scipy.spatial.transform, in numbers and in SymPy; rates near no rotation to the last digits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 from typing import Any

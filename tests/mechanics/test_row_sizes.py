@@ -1,7 +1,5 @@
 """A constraint means the same multiplied by any number; units, far places, small wheels and loops beside large ones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

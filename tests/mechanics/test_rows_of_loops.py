@@ -1,7 +1,5 @@
 """Chains of loops: Bricard, N four-bars (IFToMM A02, A04) through their change points, at tight tolerances."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

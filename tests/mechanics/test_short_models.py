@@ -1,7 +1,5 @@
 """Published models in few lines, by the elements that they need: a gait model and an arm with muscles."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

@@ -1,7 +1,5 @@
 """Solids of uniform density against integrals of the density over them, and meshes against trimesh."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import judges

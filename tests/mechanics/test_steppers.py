@@ -1,7 +1,5 @@
 """Compiled steppers: the steps of SciPy, order and stability of Radau IIA, stiff problems of the literature."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What counts as closed, as a freedom and as inertia, on both sides of the limits; sources follow from the model."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os

@@ -16,8 +16,6 @@ Mathematical analysis of the tippe top, Regul. Chaotic Dyn. 10 (2005), 333-362; 
 T. Ueda, K. Sasaki, S. Watanabe, SIAM J. Appl. Dyn. Syst. 4 (2005), 1159-1194).
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Faults that were reported of turned frames, as they were reported."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Walkers of the literature: the simplest walker and the compass gait."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

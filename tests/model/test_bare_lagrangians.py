@@ -1,7 +1,5 @@
 """A bare Lagrangian in every way to write one; which rates of inputs become inputs, and their course over time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Inertias given in every way, judged by mass matrices; markers and axes stand where SciPy puts them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Broken models: each fault is told with its file, line, dotted place and remedy, and all of them at once."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from math import sqrt

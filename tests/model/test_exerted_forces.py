@@ -1,7 +1,5 @@
 """What force elements exert on bodies, ``force(track, on=wheel).x``, by Newton and Euler; contacts in model files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

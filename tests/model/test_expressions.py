@@ -1,7 +1,5 @@
 """Texts of expressions: the meaning is Python's, slips of typing are told, and nothing but arithmetic is let in."""
 
-from __future__ import annotations
-
 import ast
 import math
 import sys

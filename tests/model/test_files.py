@@ -1,7 +1,5 @@
 """Files: what is no plain file is refused at once wherever one is read; what is written is whole or as before."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

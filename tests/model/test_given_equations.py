@@ -1,7 +1,5 @@
 """Equations that are given: in files and in Python, with rates q' = N(q, t) v + b(q, t), without an energy."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

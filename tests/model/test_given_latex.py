@@ -1,7 +1,5 @@
 """LaTeX that a model gives for its names: in documents, plots and packages; what could leave a formula is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib

@@ -1,7 +1,5 @@
 """SymPy's own numbers through from_sympy: Kane's method."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What an MJCF file says of joints, forces, inertias and ties, piece by piece: taken as MuJoCo has it, or noted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Native functions: C sources of the user in the compiled module, their Python fallbacks, and the packages."""
 
-from __future__ import annotations
-
 import builtins
 import math
 import os

@@ -1,7 +1,5 @@
 """Robot files that are wrong or hostile: an error with the line, nothing expanded, nothing outside read or run."""
 
-from __future__ import annotations
-
 import builtins
 import ctypes
 import os

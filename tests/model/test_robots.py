@@ -4,8 +4,6 @@ Always, every robot on its own base by the method that is chosen for large trees
 methods on all bases, in C too.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A name that is not known is answered by the nearest one, in the place where it is written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

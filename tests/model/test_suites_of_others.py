@@ -5,8 +5,6 @@ becomes a model; at a consistent state its accelerations are put into SymPy's ow
 JSON an object.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

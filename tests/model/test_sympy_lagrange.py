@@ -1,7 +1,5 @@
 """SymPy's Lagrange's method with its multipliers, System with a closed loop, files, names, and what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

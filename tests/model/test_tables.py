@@ -1,7 +1,5 @@
 """Tables against SciPy's interpolants by every target, in laws with closed forms, in files; their faults."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

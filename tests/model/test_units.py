@@ -1,7 +1,5 @@
 """Units: conversion to SI judged by pint and by closed forms; a table of right and wrong expressions."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

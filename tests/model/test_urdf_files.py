@@ -1,7 +1,5 @@
 """What becomes of a URDF file: names, limits, inertias, loops, mimicking and locked joints, and notes of the rest."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Python and YAML describe one and the same model; the JSON Schema knows it; what is written reads back as itself."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import math

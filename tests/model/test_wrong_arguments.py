@@ -1,7 +1,5 @@
 """Arguments and numbers that cannot be: a named error that says what is allowed, however they are given."""
 
-from __future__ import annotations
-
 import inspect
 import pickle
 from collections.abc import Callable, Iterator

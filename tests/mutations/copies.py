@@ -1,7 +1,5 @@
 """A copy of the repository in which one fault at a time is put, and the tests that are run in it."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shutil

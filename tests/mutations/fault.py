@@ -1,7 +1,5 @@
 """One deliberate fault: what is changed where, and which tests notice it."""
 
-from __future__ import annotations
-
 import ast
 import re
 import tomllib

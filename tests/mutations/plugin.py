@@ -1,7 +1,5 @@
 """A pytest plugin for runs with a fault: Hypothesis does not look for a simpler example once it has found one."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import Phase, settings
 

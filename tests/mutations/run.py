@@ -6,8 +6,6 @@ All tests named are run on the sources as they are first, and must pass.  Prints
 whole list writes ``RESULTS.md`` beside this file.  Exit status 1 if a fault survives.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The list of deliberate faults: each still fits the sources, has a test that exists, and three are really tried."""
 
-from __future__ import annotations
-
 import ast
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Exported packages have the runs of their models and, where asked for, the analyses, with NumPy alone but for runs."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

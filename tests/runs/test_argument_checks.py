@@ -1,7 +1,5 @@
 """What a call cannot take, keep or end is a named error at once, at every door, in both targets: nothing hangs."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Inertial parameters: Pinocchio's regressor column by column and its rank, turned frames, loops; and their fit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 from typing import Any

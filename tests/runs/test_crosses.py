@@ -7,8 +7,6 @@ where the input jumps, and by the acceleration that Newton's laws give there by 
 table of refusals has.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 import warnings
@@ -45,7 +43,7 @@ class Wave:
     def __call__(self, t: float) -> float:
         return float(3.0**self.order * np.sin(3.0 * t + self.order * np.pi / 2) + (self.order == 0))
 
-    def derivative(self) -> Wave:
+    def derivative(self) -> "Wave":
         return Wave(self.order + 1)
 
 

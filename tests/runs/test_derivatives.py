@@ -1,7 +1,5 @@
 """Calls of derivatives: jacobian by x, u and p, of inverse dynamics, cells of soil."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

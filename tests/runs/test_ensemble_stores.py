@@ -1,7 +1,5 @@
 """Ensembles kept in folders go on where they were, and run on workers of dask.distributed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

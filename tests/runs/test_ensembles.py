@@ -1,7 +1,5 @@
 """Many runs at once against SciPy and closed forms, and the bits of every run, however runs are shared out."""
 
-from __future__ import annotations
-
 import tracemalloc
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Static equilibria: published, closed forms, minima by SciPy; stiff, weak, moving and nonholonomic ones; stability."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

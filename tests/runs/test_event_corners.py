@@ -1,7 +1,5 @@
 """Events beside corners of inputs, jumps, values that start at zero, floors that move, events by the hundred."""
 
-from __future__ import annotations
-
 from time import process_time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The same events through every loop of steps find the same times, states and ends; none ends early in silence."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any

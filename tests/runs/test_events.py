@@ -1,7 +1,5 @@
 """Events: found where closed forms put them, with resets and impacts, by every method and both targets."""
 
-from __future__ import annotations
-
 import pickle
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parameters of measured motions: against SciPy's curve_fit, known values under noise, other units and tables."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Impacts with friction: published closed forms of every mode, Coulomb's law in space, momentum and energy; scales."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

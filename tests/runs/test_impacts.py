@@ -1,7 +1,5 @@
 """Impacts: closed forms, momentum and energy with constraints, complementarity by enumeration, runs by flights."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from itertools import combinations

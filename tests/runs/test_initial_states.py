@@ -1,7 +1,5 @@
 """Positions and velocities that close loops: given values held, branches kept, projection, beside closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import models

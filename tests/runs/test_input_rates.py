@@ -1,7 +1,5 @@
 """Inputs that move: closed forms of motions in which the rates of inputs count, whatever way the input is given."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -37,7 +35,7 @@ class Rated:
     def __call__(self, t: float, state: Any) -> float:
         return float(self.functions[0](t))
 
-    def derivative(self) -> Rated | None:
+    def derivative(self) -> "Rated | None":
         return Rated(*self.functions[1:]) if self.functions[1:] else None
 
 

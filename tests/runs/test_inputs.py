@@ -1,7 +1,5 @@
 """Inputs over time: numbers, texts, held values, lines, splines and functions mean the same in every call."""
 
-from __future__ import annotations
-
 import pickle
 from functools import cache
 from pathlib import Path

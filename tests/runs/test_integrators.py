@@ -1,7 +1,5 @@
 """Integrators held ready, single steps and steps of one size: the results of whole runs, each call as if the first."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

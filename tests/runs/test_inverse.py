@@ -1,7 +1,5 @@
 """Inverse dynamics of constrained machines, and consistent states: virtual work, SciPy's minimiser, closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import judges

@@ -4,8 +4,6 @@ Sources: vector loops of slider-crank and four-bar (Shabana, Computational Dynam
 tests/reference/slider_crank_kinematics.json.
 """
 
-from __future__ import annotations
-
 import pickle
 
 import models

@@ -1,7 +1,5 @@
 """Parameters given late: starts that are expressions of them follow; values that elements do not allow are refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Linear equations and modes: published eigenvalues, closed forms, differences; constraints add no eigenvalues."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Calls of a module: shapes, batches, arguments by place, by name, as text, in memory of the result, from threads."""
 
-from __future__ import annotations
-
 import functools
 import math
 import sys

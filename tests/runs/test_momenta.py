@@ -1,7 +1,5 @@
 """Calls and outputs that sum over all bodies: against MuJoCo, and against the balance of momentum in simulations."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import mujoco

@@ -1,7 +1,5 @@
 """A mechanism that cannot move: every call and every integrator still answers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from refusals import refuses

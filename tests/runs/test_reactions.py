@@ -1,7 +1,5 @@
 """Reactions balance every body by Newton and Euler and do no work; free-body diagrams, ADAMS, Pinocchio; redundancy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import judges

@@ -1,7 +1,5 @@
 """Events and impacts while constraints are closed for a time: as if these held always; contradictions are refused."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

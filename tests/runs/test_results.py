@@ -1,7 +1,5 @@
 """Runs for other eyes and programs: plots, xarray Datasets, netCDF, Parquet, python-control."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rigid contact with friction by Moreau's steps: closed forms, corners, sunk starts, thin walls, mean forces."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 from functools import cache

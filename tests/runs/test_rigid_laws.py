@@ -1,7 +1,5 @@
 """Rigid contact: what holds in every scene: energy, momentum, other axes and units, any part of a step."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

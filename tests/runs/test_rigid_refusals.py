@@ -1,7 +1,5 @@
 """Rigid contact: wrong calls, laws and files are refused by name, and so is all that knows no impulses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

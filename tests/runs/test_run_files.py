@@ -1,7 +1,5 @@
 """Runs in files: another run goes on from one; what is damaged or hostile is refused by name."""
 
-from __future__ import annotations
-
 import io
 import json
 import pickle

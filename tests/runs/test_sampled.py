@@ -1,7 +1,5 @@
 """Sampled states: digital controllers against their difference equations, written out by hand."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

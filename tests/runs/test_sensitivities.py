@@ -3,8 +3,6 @@
 Through events too: resets, impacts, ends; and what has no derivative is refused by name.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs: published motions, every method beside SciPy's, options, failures, and that runs leave nothing behind."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from typing import Any

@@ -1,7 +1,5 @@
 """First-order states of elements: descriptions, analyses, loops, every stepper, events; by matrices and by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs that end early: steps that lead nowhere, causes named by kernels, Ctrl-C, and what is kept of each."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

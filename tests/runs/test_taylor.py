@@ -1,7 +1,5 @@
 """Taylor's method: every recurrence beside mpmath, steps judged by their ends, and what other steppers share."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Trajectories: columns, values at any time, copies, where they come from; modules sent to other processes."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

@@ -1,7 +1,5 @@
 """Initial values given as outputs, as places and as velocities of markers, beside closed forms of the mechanisms."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 Both sides are in dynamicsymbols of the same names, and are equal to 25 digits at rational states.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Animations: as many frames as the time asks for, files that others read, pages that need no network and play."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 import io

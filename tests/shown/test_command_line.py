@@ -3,8 +3,6 @@
 0 success; 1 error in the model; 2 usage or file not found; 3 compiler or package; 4 the integration; 5 a verification.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

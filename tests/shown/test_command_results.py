@@ -1,7 +1,5 @@
 """What the verbs of ``eomgen`` find, print, write and draw, against closed forms and against each other."""
 
-from __future__ import annotations
-
 import csv
 import webbrowser
 from collections.abc import Callable

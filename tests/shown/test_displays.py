@@ -1,7 +1,5 @@
 """What notebooks, terminals and files show of equations: read back by a reader of its own it has the right values."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import re

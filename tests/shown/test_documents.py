@@ -1,7 +1,5 @@
 """README, documentation, gallery and notebooks: blocks run, links lead somewhere, what is stored is up to date."""
 
-from __future__ import annotations
-
 import ast
 import base64
 import inspect

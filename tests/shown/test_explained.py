@@ -1,7 +1,5 @@
 """Worked solutions: nothing is empty, shown is compiled, every name is defined, numbers are those of books."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Pages in which a mechanism runs: the numbers of simulate, closed loops, text that stays text, no request."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Iterator

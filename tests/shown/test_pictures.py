@@ -1,7 +1,5 @@
 """Pictures: what is drawn lies where the poses say, true to scale, of the right kind, and what hides what."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

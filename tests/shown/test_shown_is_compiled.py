@@ -4,8 +4,6 @@ All examples with the method that is chosen for them; every method with one exam
 with force elements, rolling (nonholonomic), motion over time, Euler parameters.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

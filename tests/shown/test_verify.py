@@ -1,7 +1,5 @@
 """``verify`` of modules, models and packages: correct ones pass, broken ones do not."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Quantities by name, values put in, equations near a state, views with names of instances, and what is refused."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle
