@@ -59,28 +59,9 @@ class Placement:
         return body.at(*self.position.tolist(), rpy=tuple(rpy.tolist()))
 
 
-@dataclass(frozen=True)
-class Random:
-    """A random mechanism with the numbers it was made from."""
-
-    model: eg.Model
-    parents: list[int]
-    kinds: list[str]
-    outer: list[Placement]
-    inner: list[Placement]
-    masses: np.ndarray
-    centers: np.ndarray
-    inertias: np.ndarray
-    gravity: np.ndarray
-
-    @property
-    def rigid(self) -> judges.RigidBodies:
-        return judges.RigidBodies(self.masses, self.centers, self.inertias, self.gravity)
-
-
 def coordinates_of(kind: str, name: str, rotation: str) -> list[str]:
     """Names of the coordinates of a joint of a type that can be in a tree, unless it is given others."""
-    suffixes = SUFFIXES[kind]
+    suffixes = SUFFIXES.get(kind, ())
     if kind in ("spherical", "free") and rotation == "euler_parameters":
         suffixes = (*suffixes[:-3], "_e0", "_e1", "_e2", "_e3")
     return [name + suffix for suffix in suffixes]
@@ -125,111 +106,6 @@ def _placement(random: np.random.Generator, planar: bool, kind: str) -> Placemen
     return Placement(Rotation.from_euler("z", random.uniform(-1, 1)).as_matrix(), position)
 
 
-def random_model(
-    seed: int,
-    bodies: int,
-    planar: bool = False,
-    reverse: bool = False,
-    forces: str = "",
-    loop: bool = False,
-    types: Sequence[str] = SPATIAL,
-    rotation: str = "euler_angles",
-    closing: tuple[str, np.ndarray, np.ndarray] | None = None,
-) -> Random:
-    """A tree of mixed joints.
-
-    Parameters
-    ----------
-    reverse : bool
-        Some joints lead from the outer body to the inner one.
-    forces : str
-        ``judged``: a spring and a damper to the last body, a force and a torque in body axes, which ``Judge`` knows.
-    loop : bool
-        A joint (hinge in the plane, ball in space) holds the last body to ground where the tree puts it.
-    closing : tuple
-        In place of that joint a type and the pose of the last body's marker in the joint's axes.
-    """
-    random = np.random.default_rng(seed)
-    parents: list[int] = []
-    kinds: list[str] = []
-    outer: list[Placement] = []
-    inner: list[Placement] = []
-    for k in range(bodies):
-        parents.append(int(random.integers(-1, k)) if random.random() < 0.5 else k - 1)
-        kinds.append(str(random.choice(("revolute", "prismatic", "revolute", "planar") if planar else types)))
-        for side in (outer, inner):
-            side.append(_placement(random, planar, kinds[-1]))
-    if all(kind == "weld" for kind in kinds):
-        kinds[0] = "revolute"
-    masses = random.uniform(0.5, 2.0, bodies)
-    centers = random.uniform(-0.4, 0.4, (bodies, 3)) * (np.array([1, 1, 0]) if planar else 1)
-    inertias = np.array([_inertia(random) for _ in range(bodies)])
-    if planar:
-        inertias = np.array([np.diag(np.diag(i)) for i in inertias])
-    gravity = np.array([0.3, -9.81, 0.0 if planar else 0.7])
-    turned = [reverse and random.random() < 0.5 for _ in range(bodies)]
-
-    def tree() -> tuple[eg.Model, list[Any]]:
-        m = eg.Model(f"random_{seed}", gravity=tuple(gravity.tolist()))
-        made = [m.body(f"b{k}", mass=float(masses[k]), com=tuple(centers[k].tolist()), inertia=inertias[k].tolist())
-                for k in range(bodies)]  # fmt: skip
-        for k, kind in enumerate(kinds):
-            name = f"q{k}"
-            ends = [outer[k].on(made[parents[k]] if parents[k] >= 0 else m.ground), inner[k].on(made[k])]
-            keys = options_of(kind, name, rotation)
-            if loop and SUFFIXES[kind]:  # named: they are not what is cut
-                names = coordinates_of(kind, name, rotation)
-                keys |= {"coordinates": names} if len(names) > 1 else {"coordinate": names[0]}
-            m.joint(kind, name, *(ends[::-1] if turned[k] else ends), **keys)
-        if forces:
-            _forces(m, made)
-        return m, made
-
-    m, made = tree()
-    if loop:
-        bare = m.compile(target="numpy", kernels=["poses", "rhs", "project"])
-        q = random.uniform(0.2, 0.7, bare.n_q)
-        balls = [k for k, name in enumerate(bare.q_names) if name.endswith("_e0")]
-        for k in balls:
-            q[k : k + 4] /= np.linalg.norm(q[k : k + 4])
-        pose = bare.poses(q)[-1]
-        m, made = tree()
-        kind, turn, moved = closing or (
-            "revolute" if planar else "spherical",
-            pose[:3, :3] if planar else np.eye(3),
-            np.zeros(3),
-        )
-        R = pose[:3, :3] @ turn.T
-        hold = Placement(R, pose[:3, 3] - R @ moved)
-        m.joint(kind, "close", hold.on(m.ground), made[-1], **options_of(kind, "close", rotation))
-        m.guess(**dict(zip(bare.q_names, q.tolist(), strict=True)))
-    return Random(m, parents, kinds, outer, inner, masses, centers, inertias, gravity)
-
-
-def _forces(m: eg.Model, bodies: list[Any]) -> None:
-    last = bodies[-1]
-    anchor, tip = m.ground.at(*ANCHOR.tolist()), last.at(*TIP.tolist())
-    m.spring("s", anchor, tip, stiffness=STIFFNESS, length=FREE_LENGTH)
-    m.damper("d", anchor, tip, damping=DAMPING)
-    m.force("p", bodies[0].at(*CORNER.tolist()), tuple(PUSH.tolist()), axes="body")
-    m.torque("t", bodies[(len(bodies) - 1) // 2], tuple(TWIST.tolist()), axes="body")
-
-
-def seed_with(group: tuple[str, ...], bodies: int, chain: bool = False) -> int:
-    """The first seed whose tree has a joint of each type of a group, in a chain if that is asked for."""
-    for seed in range(2000):
-        random = np.random.default_rng(seed)
-        kinds, parents = [], []
-        for k in range(bodies):  # as in random_model, without building it
-            parents.append(int(random.integers(-1, k)) if random.random() < 0.5 else k - 1)
-            kinds.append(str(random.choice(group)))
-            for _ in range(2):
-                _placement(random, False, kinds[-1])
-        if set(kinds) == set(group) and (not chain or parents == list(range(-1, bodies - 1))):
-            return seed
-    raise AssertionError(group)
-
-
 # -- judges ------------------------------------------------------------------------------------------------------------
 def basis(module: Any, q: np.ndarray) -> np.ndarray:
     """N of q' = N v, from outside."""
@@ -254,39 +130,6 @@ def gamma(module: Any, x: np.ndarray, q_dot: np.ndarray) -> np.ndarray:
     return judges.first(rates, x[: module.n_q], q_dot)
 
 
-class Judge:
-    """What the bodies do at a state, from differences of poses alone, and what the judged forces then are.
-
-    Attributes
-    ----------
-    M, h : (n, n), (n,)
-        In velocities v: M v' + h = constraint forces, by Newton and Euler and virtual power.
-    power : float
-        Of all that is neither gravity nor a spring, wrench times twist (W).
-    """
-
-    def __init__(self, module: Any, made: Random, x: np.ndarray, forces: bool = True) -> None:
-        q, v = x[: module.n_q], x[module.n_q :]
-        N = basis(module, q)
-        self.q_dot = N @ v
-        self.bodies = bodies = judges.Bodies(module, q, self.q_dot)
-        M, h = bodies.newton_euler(made.rigid)
-        self.power = 0.0
-        if forces:
-            last = len(made.masses) - 1
-            tip, tip_rate, tip_J = bodies.point(last, TIP)
-            _, corner_rate, corner_J = bodies.point(0, CORNER)
-            reach = tip - ANCHOR
-            length = float(np.linalg.norm(reach))
-            along = reach / length
-            push, twist = bodies.R[0] @ PUSH, bodies.R[last // 2] @ TWIST
-            drag = -DAMPING * float(along @ tip_rate) * along
-            self.power = float(drag @ tip_rate + push @ corner_rate + twist @ bodies.w[last // 2])
-            pull = drag - STIFFNESS * (length - FREE_LENGTH) * along
-            h = h - (tip_J.T @ pull + corner_J.T @ push + bodies.J_w[last // 2].T @ twist)
-        self.M, self.h = in_velocities(module, self.q_dot, N, v, M, h)
-
-
 def energy_rate(module: Any, q_dot: np.ndarray, x: np.ndarray, a: np.ndarray) -> tuple[float, float]:
     """(T + V)' along a motion by differences of the energies, and the size of its parts."""
     n, v = module.n_q, x[module.n_q :]
@@ -300,22 +143,32 @@ def energy_rate(module: Any, q_dot: np.ndarray, x: np.ndarray, a: np.ndarray) ->
     return sum(parts), max(map(abs, parts))
 
 
-def states_of(module: Any, seed: int, count: int) -> list[np.ndarray]:
-    """Random states: of a tree anywhere, of a loop near its declared position."""
-    random, start = np.random.default_rng(seed), module.x0()
-    if not module.n_c:
-        return [module.project(random.uniform(-1, 1, module.n_x)) for _ in range(count)]
-    sizes = np.repeat([0.05, 1.0], [module.n_q, module.n_v])
-    start[module.n_q :] = 0.0
-    return [module.project(start + sizes * random.uniform(-1, 1, module.n_x)) for _ in range(count)]
-
-
 # -- any mechanism, by Hypothesis --------------------------------------------------------------------------------------
-#: What a joint allows, of the types that can be in a loop and be cut there.
-ALLOWED = {
-    "revolute": 1, "continuous": 1, "prismatic": 1, "screw": 1, "cylindrical": 2, "universal": 2,
-    "constant_velocity": 2, "spherical": 3, "planar": 3, "translational": 3,
-}  # fmt: skip
+ANY, TURN = (Rotation.from_rotvec(v).as_matrix() for v in ([0.4, -0.7, 0.5], [0, 0, 0.6]))
+#: Joints that close a chain -> the degrees of freedom they allow (Shabana, Computational Dynamics, sec. 3.2 and 7.7;
+#: ADAMS for the primitives), and a pose that they allow by their definitions: S in axes of P.
+CLOSING: dict[str, tuple[int, np.ndarray, Any]] = {
+    "revolute": (1, TURN, (0, 0, 0)),
+    "continuous": (1, TURN, (0, 0, 0)),
+    "prismatic": (1, np.eye(3), (0, 0, 0.4)),
+    "screw": (1, TURN, (0, 0, PITCH * 0.6 / (2 * np.pi))),
+    "cylindrical": (2, TURN, (0, 0, 0.4)),
+    "universal": (2, Rotation.from_euler("XY", [0.3, 0.5]).as_matrix(), (0, 0, 0)),
+    "constant_velocity": (2, Rotation.from_rotvec([0.3, 0.5, 0]).as_matrix(), (0, 0, 0)),
+    "spherical": (3, ANY, (0, 0, 0)),
+    "planar": (3, TURN, (0.3, -0.5, 0)),
+    "translational": (3, np.eye(3), (0.3, -0.5, 0.2)),
+    "weld": (0, np.eye(3), (0, 0, 0)),
+    "distance": (5, ANY, (0.6 * LENGTH, 0.48 * LENGTH, 0.64 * LENGTH)),
+    "revolute_spherical": (4, ANY, (0.6 * LENGTH, -0.8 * LENGTH, 0)),
+    "inline": (4, ANY, (0, 0, 0.7)),
+    "inplane": (5, ANY, (0.3, -0.5, 0)),
+    "parallel": (4, TURN, (0.3, -0.5, 0.2)),
+    "perpendicular": (5, Rotation.from_euler("xz", [np.pi / 2, 0.7]).as_matrix(), (0.3, -0.5, 0.2)),
+    "orientation": (3, np.eye(3), (0.3, -0.5, 0.2)),
+}
+#: Of those with coordinates, which can be anywhere in a loop, what they allow.
+ALLOWED = {kind: allowed for kind, (allowed, *_) in [*CLOSING.items()][:10]}
 LENGTHS = ("prismatic", "curve_slider")
 SINGLE = ("revolute", "continuous", "prismatic", "screw", "curve_slider")
 FORCES = (
@@ -351,6 +204,8 @@ class Recipe:
         The joint of the loop without names of its coordinates, which is cut: ``last + 1`` is the closing one.
     doubled : bool
         The joint that closes is there twice, on one axis.
+    away : bool
+        The joint that closes is in its pose of ``CLOSING``, in place of that where its markers agree.
     """
 
     seed: int
@@ -363,6 +218,7 @@ class Recipe:
     closing: str = ""
     cut: int = 0
     doubled: bool = False
+    away: bool = False
     forces: tuple[str, ...] = ()
     constraints: tuple[str, ...] = ()
 
@@ -443,7 +299,9 @@ class Made:
                 if name == "close2":  # further along the axis
                     inner = replace(inner, position=inner.position + 0.2 * inner.rotation[:, 2])
                 R, r = self.numbers.pose[:3, :3], self.numbers.pose[:3, 3]
-                outer = Placement(R @ inner.rotation, r + R @ inner.position)
+                _, turn, moved = CLOSING[recipe.closing if recipe.away else "weld"]
+                P = R @ inner.rotation @ turn.T
+                outer = Placement(P, r + R @ inner.position - P @ moved)
                 self.join(name, recipe.closing, (-1, outer), (recipe.last, inner),
                           name == "close" and self.cut <= recipe.last)  # fmt: skip
         if whole and self.numbers.start:
@@ -476,7 +334,7 @@ class Made:
     def cut(self) -> int:
         """The joint of the loop that is cut, by having no names of coordinates."""
         able = [k for k in range(self.recipe.last + 1) if self.recipe.kinds[k] in ALLOWED]
-        able += [self.recipe.last + 1] if self.recipe.closing in ALLOWED else []
+        able += [self.recipe.last + 1] if self.recipe.closing not in ("", "weld") else []
         return able[(able.index(self.recipe.cut) + self.clothes.cut) % len(able)]
 
     @property
@@ -736,6 +594,16 @@ def numbers_of(recipe: Recipe) -> Numbers:
     return replace(numbers, start=start, pose=bare.poses(q)[recipe.last])
 
 
+def random_recipe(seed: int, kinds: Sequence[str], rotation: str = "euler_angles", **more: Any) -> Recipe:
+    """Bodies on joints of these types in any order, on ground or any earlier body; in a chain if a joint closes it."""
+    random, bodies = np.random.default_rng([seed, 7]), len(kinds)
+    kinds = tuple(random.permutation(kinds).tolist())
+    apart = random.random(bodies) < (0.0 if more.get("closing") else 0.5)
+    parents = tuple(int(random.integers(-1, k)) if apart[k] and k else k - 1 for k in range(bodies))
+    turned = tuple((random.random(bodies) < 0.5).tolist())
+    return Recipe(seed, kinds, parents, rotation=rotation, **{"turned": turned, "last": bodies - 1, **more})
+
+
 @st.composite
 def mechanisms(draw: Callable[..., Any]) -> Recipe:
     """Trees and loops, planar and in space, of all joints, cuts, forces, states, rotations and constraints."""
@@ -771,8 +639,9 @@ def mechanisms(draw: Callable[..., Any]) -> Recipe:
     forces = draw(st.lists(st.sampled_from(FORCES), unique=True, max_size=len(FORCES)))
     doubled = planar and closing == "revolute" and cut <= last and draw(st.booleans())
     recipe = Recipe(
-        seed, (*kinds,), (*parents,), (*turned,), rotation, last, planar, closing, cut, doubled, tuple(sorted(forces))
-    )
+        seed, (*kinds,), (*parents,), (*turned,), rotation, last, planar, closing, cut, doubled,
+        forces=tuple(sorted(forces)),
+    )  # fmt: skip
     if freedom < 1:
         return recipe
     way, k = 0, last  # what the last body can do

@@ -3,7 +3,7 @@
 Thirty mechanisms of each property run always, a thousand by ``make thorough``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache
 from math import inf
@@ -20,6 +20,7 @@ from random_models import (
     ANCHOR,
     AXES,
     BALL,
+    CLOSING,
     CONTACT,
     CORNER,
     DAMPING,
@@ -28,6 +29,7 @@ from random_models import (
     FREE_LENGTH,
     PUSH,
     SLIDING,
+    SPATIAL,
     SPHERE,
     STIFFNESS,
     STOP,
@@ -38,9 +40,12 @@ from random_models import (
     Made,
     Recipe,
     basis,
+    gamma,
     mechanisms,
+    random_recipe,
 )
-from sweeps import METHODS
+from scipy.linalg import null_space
+from sweeps import METHODS, part_of
 
 import eomgen as eg
 
@@ -94,11 +99,11 @@ def sized(a: np.ndarray) -> float:
 class Balance:
     """Loads on the bodies of a mechanism as it is made, and what moves them, from outside."""
 
-    def __init__(self, recipe: Recipe) -> None:
+    def __init__(self, recipe: Recipe, which: int = 0) -> None:
         self.made, self.module = compiled(recipe)
         made, module = self.made, self.module
         self.recipe = recipe = made.recipe
-        self.x = made.state(module)
+        self.x = made.state(module, which)
         self.motion = made.motion(module, self.x)
         self.wrenches = np.zeros((len(recipe.kinds), 6))  # about the bodies' origins
         self.power = 0.0  # of all that is not in the energy
@@ -240,11 +245,12 @@ class Balance:
             assert sized(axis @ (m.J_r[body] + np.cross(m.J_w[body], (m.R[body] @ TIP)[:, None], axis=0))) <= 1e-12
 
     # -- joints
-    def relative(self, name: str) -> tuple[np.ndarray, list[int]]:
-        """Velocity of S against P at S and angular velocity for a unit of each velocity of a joint (6, k)."""
+    def relative(self, name: str, among: Iterable[int] | None = None) -> tuple[np.ndarray, list[int]]:
+        """Velocity of S against P at S and angular velocity for a unit of each velocity (6, k), of the joint or all."""
         _, i, _, j, S = self.made.joints[name]
         m, place = self.motion, self.point(j, S.position)[0]
-        columns = [k for label, k in self.columns.items() if label == f"{name}_dot" or label.startswith(f"{name}_")]
+        its = (k for label, k in self.columns.items() if label == f"{name}_dot" or label.startswith(f"{name}_"))
+        columns = [*(its if among is None else among)]
         result = np.zeros((6, len(columns)))
         for body, sign in ((j, 1.0), (i, -1.0)):
             if body >= 0:
@@ -286,14 +292,43 @@ class Balance:
             assert sized(reaction @ moves) <= 1e-9 * size * max(1.0, sized(moves))
         return size
 
-    def check_bodies(self) -> None:
-        """Newton and Euler for each body with what its joints, their drives and loads exert."""
+    def needed(self) -> np.ndarray:
+        """What must act on each body about its origin, by Newton and Euler."""
         m, numbers, needed = self.motion, self.made.numbers, []
         for k, mass in enumerate(numbers.masses):
             arm, tensor = m.R[k] @ numbers.centers[k], m.R[k] @ numbers.inertias[k] @ m.R[k].T
             a = m.r_ddot[k] + np.cross(m.w_dot[k], arm) + np.cross(m.w[k], np.cross(m.w[k], arm))
             force, spin = mass * (a - numbers.gravity), tensor @ m.w_dot[k] + np.cross(m.w[k], tensor @ m.w[k])
             needed.append(np.concatenate([force, spin + np.cross(arm, force)]))
+        return np.array(needed)
+
+    def check_motion(self) -> None:
+        """M, M v' + h and v' from bodies and loads, where there are no motors: what constraints exert does no work."""
+        m, numbers, module, n = self.motion, self.made.numbers, self.module, self.module.n_q
+        q, rigid = self.x[:n], (numbers.masses, m.R @ numbers.inertias @ m.R.transpose(0, 2, 1))
+        arms = np.einsum("kij,kj->ki", m.R, numbers.centers)
+        J = m.J_r + np.cross(m.J_w, arms[:, :, None], axis=1)
+        M = np.einsum("k,kia,kib->ab", rigid[0], J, J) + np.einsum("kia,kij,kjb->ab", m.J_w, rigid[1], m.J_w)
+        np.testing.assert_allclose(module.mass_matrix(q), M, rtol=0, atol=1e-10 * sized(M))
+        assert module.energy(self.x)[0] == pytest.approx(0.5 * m.v @ M @ m.v, rel=1e-9)
+        lacking, forces = self.needed() - self.wrenches, M @ m.a + module.bias(TIME, self.x)
+        expected = np.einsum("kia,ki->a", np.concatenate([m.J_r, m.J_w], axis=1), lacking)
+        size = max(sized(lacking), sized(M @ m.a), sized(forces))
+        np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-9 * size)
+        C_q = module.constraint_jacobian(q, rows="all")
+        slopes = [judges.first(lambda y: module.constraints(y, rows="all"), q, d) for d in basis(module, q).T]
+        np.testing.assert_allclose(C_q, np.stack(slopes, 1), rtol=0, atol=1e-9 * max(1.0, sized(C_q)))
+        free = null_space(C_q, rcond=1e-9) if len(C_q) else np.eye(module.n_v)
+        assert free.shape[1] == module.n_dof
+        assert sized(expected @ free) <= 1e-9 * size
+        assert sized(C_q @ m.a + gamma(module, self.x, m.q_dot)) <= 1e-9 * max(1.0, sized(m.a), sized(m.v**2))
+        for name, reaction in zip(module.joint_names, module.reactions(TIME, self.x), strict=True):
+            moves = self.relative(name, range(module.n_v))[0] @ free
+            assert sized(reaction @ moves) <= 1e-9 * size * max(1.0, sized(moves)), name
+
+    def check_bodies(self) -> None:
+        """Newton and Euler for each body with what its joints, their drives and loads exert."""
+        needed = self.needed()
         size = max(self.exert_by_joints(), sized(needed))
         np.testing.assert_allclose(self.wrenches, needed, rtol=0, atol=1e-9 * size)
 
@@ -373,14 +408,17 @@ def judge_alike(recipe: Recipe, other: Any) -> None:
     """Another module of a mechanism gives what the first gives."""
     made, module = compiled(recipe)
     x = made.state(module)
+    q = x[: module.n_q]
     assert other.x_names == module.x_names
-    M = module.embedded_mass_matrix(x[: module.n_q]) if module.n_rows else module.mass_matrix(x[: module.n_q])
+    M = module.embedded_mass_matrix(q) if module.n_rows else module.mass_matrix(q)
     cond = float(np.linalg.cond(M)) if M.size else 1.0
     judges.agree(other.rhs(TIME, x), module.rhs(TIME, x), 1e-11, cond)
     for call in (lambda m: m.reactions(TIME, x), lambda m: m.jacobian(TIME, x)):
         ours, theirs = call(other), call(module)
         assert sized(ours - theirs) <= 1e-10 * max(1.0, cond / 1e3) * sized(theirs)
     np.testing.assert_allclose(other.energy(x), module.energy(x), rtol=1e-12, atol=1e-12)
+    for ours, theirs in ((other.mass_matrix(q), module.mass_matrix(q)), (other.bias(TIME, x), module.bias(TIME, x))):
+        assert sized(ours - theirs) <= 1e-10 * sized(theirs)
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -393,6 +431,71 @@ def test_methods_agree(batch: int) -> None:
 
 def test_targets_agree() -> None:
     for_each(1, lambda recipe: judge_alike(recipe, compiled(recipe)[0].compile(target="cython", **IN_C)), count=3)
+
+
+# -- each type of joint, in trees and to close a chain -----------------------------------------------------------------
+LOADS = ("damper", "push", "spring", "twist")
+ROTATIONS = ("euler_angles", "euler_parameters")
+GROUPS = [
+    ("revolute", "screw", "spherical"),
+    ("continuous", "universal", "free"),
+    ("prismatic", "constant_velocity", "point_on_curve"),
+    ("cylindrical", "planar", "weld", "curve_slider"),
+    ("surface_slider", "point_on_surface", "spherical"),
+    ("revolute", "translational", "spherical"),
+]
+TREES = [(group, ROTATIONS[k % 2]) for k, group in enumerate(GROUPS)]
+TREES += [(group, ROTATIONS[1 - k % 2]) for k, group in enumerate(GROUPS) if {"spherical", "free"} & {*group}]
+TREES += [(("revolute", "spherical", "universal", "free", "cylindrical") * 2, "euler_parameters")]
+CHAINS = [(kind, ROTATIONS[(k + other) % 2]) for other in (0, 1) for k, kind in enumerate(CLOSING)]
+
+
+def judge_methods(recipe: Recipe, which: int) -> Balance:
+    """A mechanism by two more methods, which differ from case to case, beside what moves its bodies."""
+    for state in (1, 0):
+        balance = Balance(recipe, state)
+        balance.check_motion()
+        balance.check_bodies()
+        balance.check_power()
+    for method in {METHODS[which % len(METHODS)], METHODS[(which + 3) % len(METHODS)]} - {"embedding"}:
+        judge_alike(balance.recipe, balance.made.compile(method))
+    return balance
+
+
+def test_every_joint_type_is_there() -> None:
+    assert {kind for group in GROUPS for kind in group} == set(SPATIAL)
+
+
+@pytest.mark.parametrize(("group", "rotation"), part_of(TREES, lambda case: TREES.index(case) < 9))
+def test_trees_of_every_joint(group: tuple[str, ...], rotation: str) -> None:
+    """M, h, accelerations, energies, reactions and the power of each wrench; velocities of the bodies as outputs."""
+    which = TREES.index((group, rotation))
+    recipe = random_recipe(which, group, rotation, forces=LOADS)
+    balance, made = judge_methods(recipe, which), Made(recipe)
+    for k in range(len(group)):
+        for name in ("wx", "wy", "wz", "vx", "vy", "vz"):
+            made.model.output(f"{name}{k}", f"{name}(b{k})")
+    twists = made.compile(kernels=["rhs", "outputs"]).outputs(TIME, balance.x).reshape(-1, 6)
+    np.testing.assert_allclose(twists, np.hstack([balance.motion.w, balance.motion.r_dot]), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("kind", "rotation"), part_of(CHAINS, lambda case: CHAINS.index(case) < len(CLOSING)))
+def test_chains_that_any_joint_closes(kind: str, rotation: str) -> None:
+    """A chain of ball, universal, cylindrical joint and hinge; redundant rows and Euler parameters included."""
+    which = CHAINS.index((kind, rotation))
+    cut = 4 if kind != "weld" else 3  # which would rather stay
+    recipe = random_recipe(which, ("spherical", "universal", "cylindrical", "revolute"), rotation, forces=LOADS,
+                           closing=kind, cut=cut, away=True)  # fmt: skip
+    balance = judge_methods(recipe, which)
+    module, x = balance.module, balance.x
+    if kind not in ("weld", "screw"):
+        assert module.metadata["loop_joint_names"] == ["close"]
+    assert module.n_dof == 8 - (6 - CLOSING[kind][0])
+    assert sized(module.constraints(x[: module.n_q], rows="all")) <= 1e-12
+    assert sized(module.velocity_constraints(x, rows="all")) <= 1e-11
+    np.testing.assert_allclose(module.project(x), x, rtol=0, atol=1e-11)
+    if which >= len(CLOSING) and which % 4 == 0:
+        judge_alike(balance.recipe, balance.made.compile(target="cython", **IN_C))
 
 
 # -- the same physics, described otherwise -----------------------------------------------------------------------------

@@ -8,9 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from analysed import compiled
-from random_models import Placement, Random, options_of, random_model, seed_with
+from random_models import Clothes, Made, random_recipe
 from refusals import refuses
-from scipy.spatial.transform import Rotation
 
 import eomgen as eg
 
@@ -70,29 +69,6 @@ def test_columns_and_number_are_those_of_pinocchios_regressor(
     assert rank == len(module.base_parameters()) == number + (2 if gravity != DOWN else 0)
 
 
-def with_other_frames(made: Random, rotation: str, seed: int) -> eg.Model:
-    """The same tree without its forces, every body described in a frame of its own."""
-    random = np.random.default_rng(seed)
-    m = eg.Model("turned", gravity=tuple(made.gravity.tolist()))
-    turns = [Rotation.random(random_state=random).as_matrix() for _ in made.masses]
-    shifts = random.uniform(-1, 1, (len(turns), 3))
-    bodies = []
-    for k, (R, shift) in enumerate(zip(turns, shifts, strict=True)):
-        com = R @ made.centers[k] + shift
-        inertia = (R @ made.inertias[k] @ R.T).tolist()
-        bodies.append(m.body(f"b{k}", mass=float(made.masses[k]), com=tuple(com.tolist()), inertia=inertia))
-
-    def on(body: int, at: Placement) -> Any:
-        if body < 0:
-            return at.on(m.ground)
-        return Placement(turns[body] @ at.rotation, turns[body] @ at.position + shifts[body]).on(bodies[body])
-
-    for k, kind in enumerate(made.kinds):
-        ends = on(made.parents[k], made.outer[k]), on(k, made.inner[k])
-        m.joint(kind, f"q{k}", *ends, **options_of(kind, f"q{k}", rotation))
-    return m
-
-
 @pytest.mark.parametrize(
     "case",
     [
@@ -106,9 +82,9 @@ def with_other_frames(made: Random, rotation: str, seed: int) -> eg.Model:
 )
 def test_number_and_forces_do_not_depend_on_frames(case: Any) -> None:
     group, count, rotation = case
-    made = random_model(seed_with(group, count), count, types=group, rotation=rotation)
-    module = made.model.derive("recursive").compile(target="numpy", kernels=KERNELS)
-    turned = with_other_frames(made, rotation, 5).derive("embedding").compile(target="numpy", kernels=KERNELS)
+    recipe = random_recipe(5, [*group, *group][:count], rotation)
+    module = Made(recipe).compile("recursive", kernels=KERNELS)
+    turned = Made(recipe, Clothes(frames=True)).compile(kernels=KERNELS)
     base, other = module.base_parameters(), turned.base_parameters()
     assert len(base) == len(other) == len(module.base_parameters(seed=3)) < len(base.standard)
     random = np.random.default_rng(6)

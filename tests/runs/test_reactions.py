@@ -7,13 +7,12 @@ import models
 import numpy as np
 import pinocchio as pin
 import pytest
-import random_models
 import rotations
 import scipy.linalg
 import sympy
 import yaml
 from analysed import compiled
-from random_models import Placement
+from random_models import SPATIAL, Made, Placement, random_recipe
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 
@@ -111,8 +110,10 @@ class Balance:
 
 @pytest.mark.parametrize(("seed", "planar"), [(20, False), (22, False), (23, True), (24, True)])
 def test_every_body_of_random_loops(seed: int, planar: bool) -> None:
-    made = random_models.random_model(seed, 5, planar=planar, reverse=True, loop=True)
-    module = made.model.compile(target="numpy")
+    kinds = ["revolute", "prismatic", "revolute", "planar"] if planar else SPATIAL
+    chosen = ["revolute", *np.random.default_rng(seed).choice(kinds, 4).tolist()]
+    made = Made(random_recipe(seed, chosen, planar=planar, closing="revolute" if planar else "spherical", cut=5))
+    module = made.compile()
     x = judges.random_states(module, seed, 1)[0]
     Balance(made.model, module, x).check(module.reactions(0.0, x))
 
@@ -151,17 +152,19 @@ def test_a_drive_on_a_cut_slider_reacts_on_both_bodies() -> None:
 
 def test_a_chain_against_pinocchio() -> None:
     """``data.f`` of the recursive Newton-Euler algorithm is the force that the parent exerts, in joint axes."""
-    made = random_models.random_model(5, 5, types=("revolute", "prismatic"))
-    module, model = made.model.compile(target="numpy"), pin.Model()
-    for k, kind in enumerate(made.kinds):
-        outer, inner = (pin.SE3(p.rotation, p.position) for p in (made.outer[k], made.inner[k]))
-        parent = made.parents[k]
-        held = pin.SE3.Identity() if parent < 0 else pin.SE3(made.inner[parent].rotation, made.inner[parent].position)
+    kinds = ("revolute", "prismatic", "revolute", "prismatic", "revolute")
+    made = Made(random_recipe(5, kinds, turned=(False,) * 5))
+    module, model, numbers = made.compile(), pin.Model(), made.numbers
+    for k, (kind, parent) in enumerate(zip(made.recipe.kinds, made.recipe.parents, strict=True)):
+        outer, inner, below = (
+            pin.SE3(p.rotation, p.position) for p in (numbers.outer[k], numbers.inner[k], numbers.inner[parent])
+        )
+        held = pin.SE3.Identity() if parent < 0 else below
         axis = pin.JointModelRZ() if kind == "revolute" else pin.JointModelPZ()
         joint = model.addJoint(parent + 1, axis, held.actInv(outer), f"q{k}")
-        body = pin.Inertia(made.masses[k], made.centers[k], made.inertias[k])
+        body = pin.Inertia(numbers.masses[k], numbers.centers[k], numbers.inertias[k])
         model.appendBodyToJoint(joint, body, inner.inverse())
-    model.gravity.linear = made.gravity
+    model.gravity.linear = numbers.gravity
     data = model.createData()
     x = judges.random_states(module, 3, 1)[0]
     order = [module.q_names.index(f"q{k}") for k in range(5)]
