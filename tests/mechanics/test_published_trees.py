@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sympy
 from scipy.integrate import solve_ivp
+from sweeps import TARGETS
 
 import eomgen as eg
 
@@ -233,3 +234,279 @@ def test_compiled_outputs_equal_the_book(module: Callable[..., Any], method: str
         force = np.array(book("force").subs(numbers), dtype=float)[:, 0]
         found = mass @ [numbers[a2], numbers[a3]]
         assert np.abs(found - force).max() <= 1e-12 * max(1.0, np.abs(force).max())
+
+
+# -- Andrews' squeezer -------------------------------------------------------------------------------------------------
+ANGLES = ("beta", "theta", "gamma", "phi", "delta", "omega", "epsilon")
+SQUEEZER = models.reference("andrews_squeezer")
+END = SQUEEZER["t_end"]
+
+
+@pytest.fixture(scope="session", params=["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
+def squeezer(request: pytest.FixtureRequest, module: Callable[..., Any]) -> Any:
+    return module("andrews_squeezer", request.param, "cython")
+
+
+@pytest.fixture(scope="session")
+def squeezed(squeezer: Any) -> Any:
+    return squeezer.simulate((0, END), rtol=1e-12, atol=1e-14)
+
+
+def residual(module: Any, x: np.ndarray) -> float:
+    """max |C| over all rows (m, rad) of states as columns."""
+    return float(np.abs(module.constraints(x[: module.n_q], rows="all")).max())
+
+
+def test_initial_position_and_accelerations(squeezer: Any) -> None:
+    given = SQUEEZER["initial_conditions"]
+    x = squeezer.x0()
+    names = squeezer.q_names
+    for name in ANGLES:
+        assert abs(x[names.index(name)] - float(given["q"][name])) <= 1e-13
+    a = dict(zip(names, squeezer.rhs(0.0, x)[squeezer.n_q :], strict=True))
+    expected = dict.fromkeys(ANGLES, 0.0)
+    expected |= {"beta": float(given["qddot_beta"]), "theta": float(given["qddot_theta"])}
+    for name in ANGLES:
+        assert abs(a[name] - expected[name]) <= 1e-11 * expected["beta"], name
+
+
+def test_seven_angles_of_the_reference(squeezed: Any) -> None:
+    for name in ANGLES:
+        published = SQUEEZER["reference_published"][name]
+        assert abs(squeezed[name][-1] - published) <= 1e-8 * abs(published), name
+        rate = SQUEEZER["reference_published"][name + "_dot"]
+        assert abs(squeezed[name + "_dot"][-1] - rate) <= 1e-7 * abs(rate), name
+
+
+def test_stored_states_keep_the_loops_closed(squeezer: Any, squeezed: Any) -> None:
+    assert residual(squeezer, squeezed.x) < 1e-11
+    assert squeezed.residuals.position < 1e-11
+    speed = np.abs(squeezed.x[squeezer.n_q :]).max()
+    assert squeezed.residuals.velocity < 1e-11 * max(1.0, speed)
+
+
+def test_energy_is_the_work_of_the_drive(squeezed: Any) -> None:
+    """The torque on K1 is constant: T + V grows by mom * (beta - beta(0)) and nothing else."""
+    work = SQUEEZER["parameters_SI"]["mom"] * (squeezed["beta"] - squeezed["beta"][0])
+    assert np.ptp(squeezed["beta"]) > 1.0
+    np.testing.assert_allclose(squeezed["energy"] - squeezed["energy"][0], work, rtol=0, atol=1e-9 * np.abs(work).max())
+
+
+def test_raw_states_of_plain_solve_ivp(squeezer: Any) -> None:
+    solution = solve_ivp(squeezer.rhs, (0, END), squeezer.x0(), method="DOP853", rtol=1e-12, atol=1e-14)
+    assert solution.success
+    assert residual(squeezer, solution.y) < 1e-10
+    final = dict(zip(squeezer.x_names, solution.y[:, -1], strict=True))
+    for name in ANGLES:
+        published = SQUEEZER["reference_published"][name]
+        assert abs(final[name] - published) <= 1e-8 * abs(published), name
+
+
+# -- A slider-crank in free motion -------------------------------------------------------------------------------------
+NAMES = {"theta": "theta", "beta": "beta", "x": "x", "thetadot": "theta_dot", "xdot": "x_dot"}
+
+
+@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("speed", [10, 150])
+def test_trajectory_equals_the_reference(module: Callable[..., Any], speed: int, method: str) -> None:
+    given = models.reference("planar_slider_crank_dynamics")["reference"][f"omega{speed}"]
+    mod = module("free_slider_crank", method, "cython")
+    times = [float(t) for t in given["values"]]
+    initial = {"theta": 0.0, "theta_dot": float(speed)}
+    run = mod.simulate((0, times[-1]), initial, t_eval=[0.0, *times], rtol=1e-13, atol=1e-14)
+    for k, row in enumerate(given["values"].values(), start=1):
+        for theirs, ours in NAMES.items():
+            expected = float(row[theirs])
+            assert abs(run[ours][k] - expected) <= 1e-9 * max(1.0, abs(expected)), (times[k - 1], ours)
+        rod = run["theta_dot"][k] + run["bend_dot"][k]
+        assert abs(rod - float(row["betadot"])) <= 1e-9 * max(1.0, abs(float(row["betadot"])))
+
+
+@pytest.mark.parametrize("speed", [10, 150])
+def test_initial_accelerations_equal_the_reference(module: Callable[..., Any], speed: int) -> None:
+    given = models.reference("planar_slider_crank_dynamics")["reference"][f"omega{speed}"]
+    mod = module("free_slider_crank")
+    x = mod.x0(theta=0.0, theta_dot=float(speed))
+    a = dict(zip(mod.q_names, mod.rhs(0.0, x)[mod.n_q :], strict=True))
+    expected = np.array([float(value) for value in given["initial_acc"]])
+    ours = np.array([a["theta"], a["theta"] + a["bend"], a["x"]])
+    assert np.abs(ours - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+# -- Peaucellier's inversor --------------------------------------------------------------------------------------------
+SQUEEZER_GIVEN = models.reference("linkages_straight_line")["peaucellier"]
+R = float(SQUEEZER_GIVEN["r"])
+POWER = float(SQUEEZER_GIVEN["L"]) ** 2 - float(SQUEEZER_GIVEN["s"]) ** 2
+
+
+@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
+def test_Q_stays_on_its_line_over_the_motion(module: Callable[..., Any], method: str) -> None:
+    mod = module("peaucellier", method, "cython")
+    p = dict(zip(mod.p_names, mod.p, strict=True))
+    assert p["r"] == R
+    assert abs(p["L"] ** 2 - p["s"] ** 2 - POWER) <= 1e-15
+    run = mod.simulate()
+    assert np.ptp(run["theta"]) > 1.0
+    assert np.abs(run["Q_x"] - float(SQUEEZER_GIVEN["straight_line_x"])).max() <= 1e-10
+    expected = POWER / (2 * R) * np.tan(run["theta"] / 2)
+    assert np.abs(run["Q_y"] - expected).max() <= 1e-10
+    assert np.abs(np.hypot(run["P_x"] - R, run["P_y"]) - R).max() <= 1e-10
+    # P and Q lie on one ray from O, inverse to each other
+    assert np.abs(run["P_x"] * run["Q_y"] - run["P_y"] * run["Q_x"]).max() <= 1e-10
+    assert np.abs(run["P_x"] * run["Q_x"] + run["P_y"] * run["Q_y"] - POWER).max() <= 1e-10
+    assert run.residuals.position < 1e-11
+
+
+def test_points_equal_the_reference(module: Callable[..., Any]) -> None:
+    mod = module("peaucellier")
+    angles = np.radians([float(key) for key in SQUEEZER_GIVEN["rows"]])
+    q, _, _ = mod.kinematics(angles[None, :])
+    poses = mod.poses(q)
+    s = dict(zip(mod.p_names, mod.p, strict=True))["s"]
+    for body, length, point in (("crank", R, "P"), ("side_qa", s, "Q"), ("side_qb", s, "Q"), ("side_pa", s, "P")):
+        pose = poses[mod.body_names.index(body)]
+        places = np.einsum("ijk,j->ik", pose[:2], np.array([length, 0, 0, 1]))
+        expected = np.array([[float(x) for x in row[point]] for row in SQUEEZER_GIVEN["rows"].values()]).T
+        assert np.abs(places - expected).max() <= 1e-10, body
+
+
+# -- The minimal form --------------------------------------------------------------------------------------------------
+TIGHT_RUNS = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+
+
+@pytest.mark.parametrize("method", ["embedding", pytest.param("lagrange", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    ("name", "end", "given"),
+    [
+        ("slider_crank", 1.0, {"theta": 0.3, "theta_dot": 10.0}),
+        ("four_bar", 1.0, {"theta": 1.0, "theta_dot": 10.0}),
+        ("spatial_loop", 1.0, {"theta": 0.4, "theta_dot": 6.0}),
+    ],
+)
+def test_minimal_form_equals_the_tree_form(
+    module: Callable[..., Any], name: str, end: float, given: dict[str, float], method: str
+) -> None:
+    mod = module(name, method, "cython")
+    minimal = mod.minimal
+    assert minimal.x_names == ("theta", "theta_dot")
+    start = minimal.x0(**given)
+    assert start.shape == (2,)
+    assert start == pytest.approx(list(given.values()), abs=1e-15)
+    times = np.linspace(0, end, 21)
+    small = solve_ivp(minimal.rhs, (0, end), start, t_eval=times, **TIGHT_RUNS)
+    full = solve_ivp(mod.rhs, (0, end), mod.x0(**given), t_eval=times, **TIGHT_RUNS)
+    assert small.success
+    assert full.success
+    assert np.ptp(small.y[0]) > 1.0
+    projected = mod.project(full.y)
+    chosen = [mod.x_names.index("theta"), mod.x_names.index("theta_dot")]
+    sizes = np.abs(projected).max(axis=1, keepdims=True)
+    assert np.abs(small.y - projected[chosen]).max() <= 1e-9 * sizes[chosen].max()
+    minimal.reset(projected[: mod.n_q, 0])
+    expanded = minimal.expand(small.y, times)
+    assert (np.abs(expanded - projected) <= 1e-9 * np.maximum(1.0, sizes)).all()
+
+
+def test_the_solved_system_has_the_size_of_the_degrees_of_freedom(module: Callable[..., Any]) -> None:
+    mod = module("slider_crank")
+    assert (mod.n_dof, mod.minimal.n_x, mod.n_x) == (1, 2, 6)
+    x = mod.x0(theta=0.3, theta_dot=10.0)
+    M = mod.embedded_mass_matrix(x[: mod.n_q])
+    assert M.shape == (1, 1)
+    # T = v_i^T M v_i / 2
+    assert mod.energy(x)[0] == pytest.approx(0.5 * M[0, 0] * 100.0, rel=1e-13)
+    assert mod.minimal.rhs(0.0, mod.minimal.reduce(x)) == pytest.approx(mod.minimal.reduce(mod.rhs(0.0, x)), rel=1e-12)
+
+
+# -- Short models ------------------------------------------------------------------------------------------------------
+def gait(p: dict[str, float]) -> eg.Model:
+    m = eg.Model("gait", gravity=(0, -9.81, 0))
+    for name, value in p.items():
+        m.parameter(name, value)
+    trunk = m.body("trunk", mass="TrunkMass", com=(0, "TrunkCMy", 0), inertia={"zz": "TrunkInertia"})
+    m.planar("hip", m.ground, trunk, coordinates=("q1", "q2", "q3"))
+    feet, k = [trunk.marker("com", at=(0, "TrunkCMy", 0)), trunk], 4
+    for side in ("right", "left"):
+        above, at = trunk, 0
+        for name in ("Thigh", "Shank", "Foot"):
+            com = ("FootCMx" if name == "Foot" else 0, f"{name}CMy", 0)
+            body = m.body(f"{side}{name}", mass=f"{name}Mass", com=com, inertia={"zz": f"{name}Inertia"})
+            m.torque(f"M{k}", m.revolute(f"q{k}", above.at(0, at, 0), body), m.input(f"T{k}"))
+            above, at, k = body, f"-{name}Len", k + 1
+            feet += [body] * (name != "Thigh")
+        feet += [body.marker(part.lower(), at=(f"Contact{part}X", "ContactY", 0)) for part in ("Heel", "Toe")]
+    m.force("push", feet[0], value=(m.input("Fx"), m.input("Fy"), 0))
+    m.torque("turn", trunk, value=(0, 0, m.input("T3")))
+    for k, foot in enumerate(feet):
+        y = f"y({foot.label})"
+        m.output(f"N{k}", f"(ContactStiff*max(0, -{y})**3 - {y})*(1 - ContactDamp*vy({foot.label}))")
+        m.force(f"floor{k}", foot, value=(f"-ContactFric*N{k}*tanh(vx({foot.label})/(2*ContactV0))", f"N{k}", 0))
+    return m
+
+
+def arm(p: dict[str, Any]) -> eg.Model:
+    m = eg.Model("arm", gravity=(0, 0, p["g"]), check_inertia="note")
+    thin = {name: p[f"m{name}"] * p[f"l{name}"] ** 2 for name in "ACD"}  # the tutorial's rods have l^2 / 2 along
+    A, C, D = (
+        m.body(
+            n,
+            mass=p[f"m{n}"],
+            com=(0, 0, 0 if n == "A" else p[f"l{n}"] / 2),
+            inertia=[I / (2 if k == (n != "A") + 1 else 12) for k in range(3)],
+        )
+        for n, I in thin.items()
+    )
+    B = m.body("B", mass=0)
+    m.revolute("q1", m.ground.at(p["dx"], 0, 0), A, coordinate="q1")
+    m.revolute("q2", m.ground.at(0, p["dy"], p["dz"]), B, axis="y", coordinate="q2")
+    m.revolute("q3", B, C, coordinate="q3")
+    m.revolute("q4", C.at(0, 0, p["lC"]), D, axis="y", coordinate="q4")
+    m.spherical("hand", A.at(0, p["lA"], 0), D.at(0, 0, p["lD"]))
+    m.torsional_element("grip", "q1", law=f"-{p['k']}*angle - {p['c']}*rate")
+    drum = {"around": C.at(0, 0, p["lC"], rpy=(-np.pi / 2, 0, 0)), "radius": p["r"], "sense": "positive"}
+    for name, via in (("biceps", []), ("triceps", [drum])):
+        own = dict(zip(("force_max", "fiber_length", "slack_length"), p[name].values(), strict=True))
+        m.muscle(
+            name, C.at(0, 0, p["lC"] / 3), D.at(0, 0, p["lD"] / 3), excitation=m.input(f"e_{name}"), via=via, **own
+        )
+    return m
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_gait(target: str) -> None:
+    """Accelerations and the ground's forces of Autolev's code, with all contacts and inputs."""
+    given = models.reference("gait2d_autolev")
+    mod = gait(given["parameters_SI"]).compile(target=target)
+    for case in given["cases"]:
+        names = ["Fx", "Fy", "T3", *(f"T{k}" for k in range(4, 10))]
+        x = mod.x0(
+            **{f"q{k + 1}": q for k, q in enumerate(case["q"])}, **{f"q{k + 1}_dot": v for k, v in enumerate(case["u"])}
+        )
+        inputs = dict(zip(names, case["inputs"], strict=True))
+        rates = dict(zip(mod.v_names, mod.rhs(0.0, x, u=[inputs[n] for n in mod.u_names])[9:], strict=True))
+        found = [rates[f"q{k}_dot"] for k in range(1, 10)]
+        assert found == pytest.approx(case["qdd_autolev"], rel=1e-12, abs=1e-11)
+        y = dict(zip(mod.y_names, mod.outputs(0.0, x), strict=True))
+        right, left = y["N4"] + y["N5"], y["N8"] + y["N9"]
+        assert [right, left] == pytest.approx([case["grf_autolev"][k] for k in (1, 4)], rel=1e-12)
+
+
+def test_arm() -> None:
+    """The consistent accelerations; activation follows its excitation by the published rate."""
+    given = models.reference("muscle_lever_sympy")
+    m = arm(given["parameters_SI"])
+    q = {f"q{k + 1}": value for k, value in enumerate(given["own"]["q0"])}
+    m.guess(**q)
+    mod = m.compile(target="numpy")
+    rates = dict(zip(mod.x_names, mod.rhs(0.0, mod.x0(**q)), strict=True))
+    assert [rates[f"q{k}_dot"] for k in range(1, 5)] == pytest.approx(given["own"]["qdd0"], rel=1e-7)
+    x = mod.x0(**q, biceps_activation=0.3, triceps_activation=0.1)
+    e = {"e_biceps": 0.8, "e_triceps": 0.05}
+    rates = dict(zip(mod.x_names, mod.rhs(0.0, x, u=[e[n] for n in mod.u_names]), strict=True))
+
+    def published(e: float, a: float) -> float:
+        h = np.tanh(10 * (e - a)) / 2
+        return float(((0.5 + h) / (0.015 * (0.5 + 1.5 * a)) + (0.5 + 1.5 * a) * (0.5 - h) / 0.06) * (e - a))
+
+    found = [rates["biceps_activation"], rates["triceps_activation"]]
+    assert found == pytest.approx([published(0.8, 0.3), published(0.05, 0.1)], rel=1e-13)

@@ -94,7 +94,7 @@ def always(case: tuple[int, bool, str]) -> bool:
 @pytest.mark.parametrize(("seed", "planar", "method"), part_of(CASES, always))
 def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
     """Mass matrix, bias, inverse dynamics, accelerations, energies and poses."""
-    made = random_tree(seed, 1 + seed % 6, planar)
+    made = random_tree(seed + 20 * planar, 1 + seed % 6, planar)  # the plane has a row of hinges there
     mod = made.compile(method, kernels=KERNELS)
     other = InPinocchio(made, mod.q_names)
     model, data, order = other.model, other.data, other.order

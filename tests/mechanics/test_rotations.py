@@ -2,14 +2,25 @@
 
 from collections.abc import Callable
 from itertools import product
+from pathlib import Path
 from typing import Any
 
+import judges
 import mpmath as mp
 import numpy as np
+import pinocchio
 import pytest
+import rotations
 import sympy
+from models import IN_C, reference
+from numpy.typing import NDArray
+from refusals import refuses
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from shipped_robots import EXAMPLES
+from sweeps import TARGETS
 
+import eomgen as eg
 from eomgen.elements import rotations as rot
 
 # -- Conversions and rates ---------------------------------------------------------------------------------------------
@@ -234,3 +245,417 @@ def test_rates_of_rotation_vectors(angle: float, axes: str) -> None:
         for found, expected in pairs:
             gap = max(abs(mp.mpf(float(found[i, j])) - expected[i, j]) for i in range(3) for j in range(3))
             assert gap <= (4e-16 if angle < 0.1 else 4e-15 / angle)  # quotients lose what cancels in them
+
+
+# -- angular velocities and accelerations ------------------------------------------------------------------------------
+NAMES = [f"w{axis}{suffix}" for suffix in ("", "_body", "_dot", "_body_dot") for axis in "xyz"]
+
+
+def test_a_disc_that_spins_on_a_turning_arm(tmp_path: Path) -> None:
+    """Turn Omega about z, spin sigma about e_r, both steady: w = Omega e_z + sigma e_r, w' = Omega sigma e_z x e_r."""
+    m = eg.Model("spinner")
+    arm = m.body("arm", mass=1, inertia=(1, 1, 1))
+    disc = m.body("disc", mass=1, inertia=(1, 0.5, 0.5))
+    m.revolute("turn", m.ground, arm)
+    m.revolute("spin", arm, disc, axis="x")
+    # own axes of the marker: x along -y of the arm, y along its x
+    rim = arm.marker("rim", at=(0.3, 0, 0), rpy=(0, 0, -np.pi / 2))
+    for name, handle in (("disc", disc), ("rim", rim)):
+        for word, triple in (
+            ("w", handle.angular_velocity), ("b", handle.body_angular_velocity),
+            ("a", handle.angular_acceleration), ("c", handle.body_angular_acceleration),
+        ):  # fmt: skip
+            for axis, value in zip("xyz", triple, strict=True):
+                m.output(f"{name}_{word}{axis}", value)
+    m.output("still", m.ground.angular_velocity[0] + m.ground.angular_acceleration[2])
+    mod = m.compile(target="numpy")
+    phi, psi, omega, sigma = 0.4, 0.9, 1.3, 7.0
+    x = mod.x0(turn=phi, spin=psi, turn_dot=omega, spin_dot=sigma)
+    y = dict(zip(mod.y_names, mod.outputs(0.0, x), strict=True))
+
+    def triple(name: str) -> list[float]:
+        return [y[name + axis] for axis in "xyz"]
+
+    c, s = np.cos(phi), np.sin(phi)
+    cp, sp = np.cos(psi), np.sin(psi)
+    assert triple("disc_w") == pytest.approx([sigma * c, sigma * s, omega], abs=1e-14)
+    assert triple("disc_b") == pytest.approx([sigma, omega * sp, omega * cp], abs=1e-14)
+    assert triple("disc_a") == pytest.approx([-omega * sigma * s, omega * sigma * c, 0], abs=1e-13)
+    assert triple("disc_c") == pytest.approx([0, omega * sigma * cp, -omega * sigma * sp], abs=1e-13)
+    assert triple("rim_w") == triple("rim_b") == pytest.approx([0, 0, omega], abs=1e-14)
+    assert y["still"] == 0.0
+    path = tmp_path / "spinner.yaml"
+    m.save(path)
+    again = eg.load(path).compile(target="numpy")
+    assert again.outputs(0.0, x) == pytest.approx(mod.outputs(0.0, x), abs=1e-15)
+
+
+def test_a_robot_turns_as_pinocchio_says() -> None:
+    path = EXAMPLES / "panda_description" / "urdf" / "panda.urdf"
+    m = eg.load(path, lock=["panda_finger_joint1", "panda_finger_joint2"])
+    for name in NAMES:
+        m.output(name, f"{name}(panda_link6)")
+    mod = m.compile(target="numpy")
+    x = np.random.default_rng(3).uniform(-1, 1, mod.n_x)
+    y = dict(zip(mod.y_names, mod.outputs(0.0, x), strict=True))
+    n = mod.n_q
+    q, v, a = np.zeros((3, 9))
+    q[:n], v[:n], a[:n] = x[:n], x[n:], mod.rhs(0.0, x)[n:]
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data = model.createData()
+    pinocchio.forwardKinematics(model, data, q, v, a)
+    frame = model.getFrameId("panda_link6")
+    axes = pinocchio.ReferenceFrame
+    for suffix, frame_of in (("", axes.LOCAL_WORLD_ALIGNED), ("_body", axes.LOCAL)):
+        velocity = pinocchio.getFrameVelocity(model, data, frame, frame_of).angular
+        acceleration = pinocchio.getFrameAcceleration(model, data, frame, frame_of).angular
+        assert [y[f"w{k}{suffix}"] for k in "xyz"] == pytest.approx(velocity, rel=1e-11)
+        assert [y[f"w{k}{suffix}_dot"] for k in "xyz"] == pytest.approx(acceleration, rel=1e-11)
+
+
+HELD = """
+name: held
+gravity: [0, 0, -9.81]
+bodies: {{b: {{mass: 2, inertia: [0.1, 0.2, 0.3], markers: {{tip: {{at: [0.3, 0.1, -0.2]}}}}}}}}
+joints: {{P: {{type: {joint}, between: [ground, b], {turning}}}}}
+constraints: {{c: {{type: coupling, equation: "{equation}"{more}}}}}
+"""
+INERTIA, TIP, ON = np.diag([0.1, 0.2, 0.3]), np.array([0.3, 0.1, -0.2]), (0.3, 0.7)
+Vector = NDArray[np.float64]
+Row = tuple[Vector, float, float]  #: factors of the rates of (v, w), the rest, and the equation's value
+
+
+def _turned(direction: Vector, w: Vector, value: float) -> Row:
+    """An equation of w along a direction of ground or of the body, neither of which changes its value by turning."""
+    return np.r_[np.zeros(3), direction], 0.0, direction @ w - value
+
+
+def _moved(n: Vector, n_dot: Vector, r: Vector, v: Vector, w: Vector) -> Row:
+    """n . (velocity of the tip) = 0."""
+    speed = v + np.cross(w, r)
+    return np.r_[n, np.cross(r, n)], n @ np.cross(w, np.cross(w, r)) + n_dot @ speed, n @ speed
+
+
+EQUATIONS = {
+    "wz(b) - 0.5": lambda R, v, w: _turned(np.array([0.0, 0.0, 1.0]), w, 0.5),
+    "wx(b, in=b) - 0.5": lambda R, v, w: _turned(R[:, 0], w, 0.5),
+    "wy_body(b) - 0.2*wz(b)": lambda R, v, w: _turned(R[:, 1] - 0.2 * np.eye(3)[2], w, 0.0),
+    "vx(b.tip) - 0.4*vy(b.tip)": lambda R, v, w: _moved(np.array([1.0, -0.4, 0.0]), np.zeros(3), R @ TIP, v, w),
+    "vz(b.tip, in=b)": lambda R, v, w: _moved(R[:, 2], np.cross(w, R[:, 2]), R @ TIP, v, w),
+}
+
+
+def _rate(equation: str | None, fixed: bool, y: Vector) -> Vector:
+    """Newton's and Euler's equations of the body in ground axes, with multipliers; y is place, quaternion, v and w."""
+    R, v, w = Rotation.from_quat(y[3:7]).as_matrix(), y[7:10], y[10:]
+    own = R @ INERTIA @ R.T
+    rows = [EQUATIONS[equation](R, v, w)[:2]] if equation else []
+    rows += [(row, 0.0) for row in np.eye(6)[:3]] if fixed else []
+    A, rest = np.array([row for row, _ in rows]).reshape(-1, 6), np.array([c for _, c in rows])
+    K = np.block([[np.diag([2.0] * 3), np.zeros((3, 3)), A[:, :3].T], [np.zeros((3, 3)), own, A[:, 3:].T],
+                  [A, np.zeros((len(rows), len(rows)))]])  # fmt: skip
+    moved = np.linalg.solve(K, np.r_[0, 0, -2 * 9.81, -np.cross(w, own @ w), -rest])[:6]
+    spin = 0.5 * np.r_[y[6] * w + np.cross(w, y[3:6]), -w @ y[3:6]]
+    return np.r_[v, spin, moved]
+
+
+def _led(equation: str | None, fixed: bool, y: Vector, span: float) -> Vector:
+    found = solve_ivp(lambda t, y: _rate(equation, fixed, y), (0, span), y, rtol=1e-11, atol=1e-12, method="DOP853")
+    return found.y[:, -1]
+
+
+def _obeying(equation: str, y: Vector, metric: Vector) -> Vector:
+    """The velocities that obey the equation, nearest by the metric (that of the mass: after an impact)."""
+    row, _, value = EQUATIONS[equation](Rotation.from_quat(y[3:7]).as_matrix(), y[7:10], y[10:])
+    push = np.linalg.solve(metric, row)
+    return np.r_[y[:7], y[7:] - push * value / (row @ push)]
+
+
+def _start(turning: str, y: Vector, free: bool) -> dict[str, float]:
+    """The same state in the coordinates of the joint."""
+    turn, v, w = Rotation.from_quat(y[3:7]), y[7:10], y[10:]
+    found = dict(zip(("P_x_dot", "P_y_dot", "P_z_dot"), v, strict=True)) if free else {}
+    if "parameters" in turning:
+        found |= dict(zip(("P_e1", "P_e2", "P_e3", "P_e0"), y[3:7], strict=True))
+        return found | dict(zip(("P_wx", "P_wy", "P_wz"), turn.as_matrix().T @ w, strict=True))
+    sequence = turning.removeprefix("sequence: ").upper()
+    angles = turn.as_euler(sequence)
+    axes = [Rotation.from_euler(sequence[: k + 1], angles[: k + 1]).as_matrix()[:, "XYZ".index(sequence[k])]
+            for k in range(3)]  # fmt: skip
+    found |= dict(zip(("P_1", "P_2", "P_3"), angles, strict=True))
+    return found | dict(zip(("P_1_dot", "P_2_dot", "P_3_dot"), np.linalg.solve(np.array(axes).T, w), strict=True))
+
+
+DESCRIPTIONS = [
+    ("sequence: xyz", "lagrange"),
+    ("sequence: yzy", "newton_euler"),
+    ("rotation: euler_parameters", "embedding"),
+]
+LAWS = [(case, equation) for case in ("free", "closes") for equation in EQUATIONS]
+LAWS += [("spherical", equation) for equation in EQUATIONS if equation.startswith("w")]
+
+
+@pytest.mark.parametrize(("turning", "method"), DESCRIPTIONS)
+@pytest.mark.parametrize(("case", "equation"), LAWS)
+def test_an_equation_of_angular_velocities_holds(
+    case: str, equation: str, turning: str, method: str, tmp_path: Path
+) -> None:
+    """For good and for a time, whatever the coordinates and the method: the motion is that of Newton and Euler."""
+    fixed, passing = case == "spherical", case == "closes"
+    y = np.r_[np.zeros(3), Rotation.from_euler("XYZ", [0.3, 0.4, 0.5]).as_quat(), [0.2, -0.5, 0.3], [0.7, -0.4, 0.9]]
+    y[7:10] *= not fixed
+    if not passing:
+        y = _obeying(equation, y, np.diag([1e9] * 3 + [1.0] * 3) if fixed else np.eye(6))
+    more = f", closes: {ON[0]} - t, opens: {ON[1]} - t" if passing else ""
+    path = tmp_path / "held.yaml"
+    text = HELD.format(joint="spherical" if fixed else "free", turning=turning, equation=equation, more=more)
+    text += "outputs:\n" + "".join(f"  {n}{k}: {n}{k}(b)\n" for n in "vw" for k in "xyz") + f"  left: {equation}\n"
+    path.write_text(text, encoding="utf-8")
+    mod = eg.load(path).compile(target="numpy", method=method)
+    run = mod.simulate(1.0, initial=_start(turning, y, not fixed), rtol=1e-10, atol=1e-11)
+    if passing:
+        before = _led(None, fixed, y, ON[0])
+        R = Rotation.from_quat(before[3:7]).as_matrix()
+        mass = np.block([[2 * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), R @ INERTIA @ R.T]])
+        end = _led(None, fixed, _led(equation, fixed, _obeying(equation, before, mass), ON[1] - ON[0]), 1.0 - ON[1])
+    else:
+        end = _led(equation, fixed, y, 1.0)
+    held = (run.t > ON[0] + 1e-9) & (run.t < ON[1] - 1e-9) if passing else run.t >= 0
+    assert np.abs(run["left"][held]).max() < 1e-9
+    velocities = [run[f"{n}{k}"][-1] for n in "vw" for k in "xyz"]
+    assert velocities == pytest.approx(end[7:], abs=1e-8)
+
+
+@pytest.mark.parametrize("turning", ["euler_angles", "euler_parameters"])
+@pytest.mark.parametrize("closes", [None, "0.2 - t"])
+def test_an_angular_velocity_follows_an_input(turning: str, closes: str | None) -> None:
+    """The equation needs the rate of the input, for a time as for good."""
+    m = eg.Model("led")
+    b = m.body("b", mass=2, inertia=(0.1, 0.2, 0.3))
+    m.free("P", m.ground, b, rotation=turning)
+    m.input("u", 0.5)
+    m.coupling("c", equation="wz(b) - u", **({} if closes is None else {"closes": closes}))
+    m.output("w", "wz(b)")
+    run = m.compile(target="numpy").simulate(1.0, inputs={"u": "0.5 + sin(2*t)"})
+    held = run.t > (0.0 if closes is None else 0.2 + 1e-9)
+    assert np.abs(run["w"] - 0.5 - np.sin(2 * run.t))[held].max() < 1e-8
+
+
+# -- euler parameters --------------------------------------------------------------------------------------------------
+def free_body(rotation: str, inertia: tuple[float, float, float], sequence: str | None = None) -> eg.Model:
+    m = eg.Model("thrown")
+    b = m.body("b", mass=2.0, com=(0, 0, 0), inertia=inertia)
+    m.free("f", m.ground, b, rotation=rotation, sequence=sequence)
+    return m
+
+
+def test_a_free_body_tumbles_as_jacobi_says() -> None:
+    """torque_free_rigid_body.json: angular velocity by Jacobi's elliptic functions; energy and momentum are kept."""
+    case = reference("torque_free_rigid_body")["reference"]["jacobi_start_w2_0"]
+    w0 = [float(x) for x in case["omega0"]]
+    module = free_body("euler_parameters", (1, 2, 3)).compile(target="numpy")
+    start = {"f_wx": w0[0], "f_wy": w0[1], "f_wz": w0[2], "f_x_dot": 0.1}
+    times = np.unique(np.concatenate([[1, 2, 5, 10], np.linspace(0, 100, 101)]))
+    traj = module.simulate((0, 100), initial=start, t_eval=times, rtol=1e-13, atol=1e-14)
+    w = np.array([traj[f"f_w{axis}"] for axis in "xyz"])
+    for text, expected in case["omega"].items():
+        k = int(np.flatnonzero(times == float(text))[0])
+        np.testing.assert_allclose(w[:, k], [float(x) for x in expected], atol=1e-11)
+    e = np.array([traj[f"f_e{k}"] for k in range(4)])
+    np.testing.assert_allclose((e * e).sum(axis=0), 1.0, atol=1e-14)
+    momentum = np.array([rotations.matrix(e[:, k]) @ ([1, 2, 3] * w[:, k]) for k in range(len(times))])
+    assert np.abs(momentum - momentum[0]).max() < 1e-8 * np.linalg.norm(momentum[0])
+    assert traj.energy_drift < 1e-8
+
+
+@pytest.mark.parametrize(("sequence", "method"), [("xyz", "embedding"), ("xyz", "lagrange"), ("zxz", "recursive")])
+def test_euler_angles_stop_at_their_singularity_and_pass_by_it(sequence: str, method: str) -> None:
+    """A ball spins about a fixed axis exactly through, and nearly through, the singular orientation at t = 1 s."""
+    module = free_body("euler_angles", (0.4, 0.4, 0.4), sequence).compile(method=method, target="numpy")
+    w = np.array([0.7, -0.5, 0.9])  # in body axes, constant
+    middle = np.pi / 2 if len(set(sequence)) == 3 else 0.0
+    for miss in (0.0, 1e-2):
+        at_one = Rotation.from_euler(sequence.upper(), [0.3, middle + miss, 0.2])
+        begin = (at_one * Rotation.from_rotvec(-w)).as_matrix()
+        x = module.x0(angles(begin, w, sequence))
+        if not miss:
+            refuses("EG-STALLED f euler_parameters", module.simulate, (0, 2), initial=x, rtol=1e-10, atol=1e-12)
+            continue
+        traj = module.simulate((0, 2), initial=x, rtol=1e-11, atol=1e-12)
+        end = module.poses(traj.x[: module.n_q, -1])[0, :3, :3]
+        np.testing.assert_allclose(end, (at_one * Rotation.from_rotvec(w)).as_matrix(), atol=1e-7)
+        assert traj.energy_drift < 1e-8
+
+
+def angles(R: np.ndarray, w: np.ndarray, sequence: str) -> dict[str, float]:
+    """Euler angles of a rotation and their rates for an angular velocity in body axes, by SciPy and differences."""
+    here = Rotation.from_matrix(R).as_euler(sequence.upper())
+
+    def turned(h: float) -> np.ndarray:
+        later = (Rotation.from_matrix(R) * Rotation.from_rotvec(h * w)).as_euler(sequence.upper())
+        return here + np.remainder(later - here + np.pi, 2 * np.pi) - np.pi
+
+    h = 2e-3
+    slopes = sum(c * (turned(k * h) - turned(-k * h)) for k, c in enumerate((4 / 5, -1 / 5, 4 / 105, -1 / 280), 1)) / h
+    values = {f"f_{k + 1}": x for k, x in enumerate(here)}
+    return values | {f"f_{k + 1}_dot": x for k, x in enumerate(slopes)}
+
+
+def test_initial_values() -> None:
+    module = free_body("euler_parameters", (1, 2, 3)).compile(target="numpy")
+    np.testing.assert_array_equal(module.x0()[3:7], [1, 0, 0, 0])
+    half = 0.3
+    x = module.x0(f_e0=np.cos(half), f_e3=np.sin(half), f_z=2.0, f_wz=1.5)
+    np.testing.assert_allclose(x, [0, 0, 2, np.cos(half), 0, 0, np.sin(half), 0, 0, 0, 0, 0, 1.5], atol=1e-15)
+    assert np.linalg.norm(module.x0(f_e0=0.7071068, f_e1=0.7071068)[3:7]) == pytest.approx(1.0, abs=1e-15)
+    refuses("EG-CONTRADICTION f_e0 0.5 1", module.x0, f_e0=0.5)
+    refuses("EG-NAME-UNKNOWN f_wx", module.x0, f_e0_dot=0.5)
+    refuses("EG-UNSUPPORTED f_wx", getattr, module, "minimal")
+    refuses("EG-UNSUPPORTED minimal", module.kinematics, np.zeros(6))
+
+
+def test_names_units_columns_and_expressions() -> None:
+    m = free_body("euler_parameters", (1, 2, 3))
+    m.output("twice", "2*f_e1_dot + f_wx + f_wy_dot")
+    m.torque("drag", "b", ("-0.1*f_wx", 0, "0.2*f_e1"), axes="body")
+    module = m.compile(target="numpy")
+    assert module.q_names == ("f_x", "f_y", "f_z", "f_e0", "f_e1", "f_e2", "f_e3")
+    assert module.v_names == ("f_x_dot", "f_y_dot", "f_z_dot", "f_wx", "f_wy", "f_wz")
+    traj = module.simulate(1.0, initial={"f_wx": 1.0, "f_wy": 0.2, "f_wz": 0.3})
+    assert traj.x_names == module.q_names + module.v_names
+    expected = 2 * traj["f_e1_dot"] + traj["f_wx"] + traj["f_wy_dot"]
+    np.testing.assert_allclose(traj["twice"], expected, atol=1e-12)
+    e, w = (np.array([traj[n] for n in names]) for names in (module.q_names[3:], module.v_names[3:]))
+    np.testing.assert_allclose(
+        [traj[f"f_e{k}_dot"] for k in range(4)], np.array([rotations.rates(*p) for p in zip(e.T, w.T, strict=True)]).T
+    )
+    # Euler's equation of the first axis, from outside
+    np.testing.assert_allclose(traj["f_wx_dot"], (2 - 3) * w[1] * w[2] - 0.1 * w[0], atol=1e-12)
+    assert traj.units["f_wx"] == "rad/s"
+    assert traj.units["f_wx_dot"] == "rad/s^2"
+    assert "f_e0" not in traj.units
+    assert traj.units["f_e0_dot"] == "1/s"
+
+
+def stone(rotation: str = "euler_parameters", **keys: Any) -> eg.Model:
+    m = eg.Model("stone", gravity=(0, 0, -9.81))
+    m.free("f", m.ground, m.body("b", mass=2.0, com=(0.1, 0.2, 0.3), inertia=(1, 2, 2.5)), rotation=rotation, **keys)
+    return m
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_no_rotation_and_no_number_are_named(target: str) -> None:
+    module = stone().compile(target=target, **(IN_C if target == "cython" else {}))
+    start = module.x0(f_wx=1.0)
+    first = module.q_names.index("f_e0")
+    for size in (0.0, 1e-170):
+        x = np.array(start)
+        x[first : first + 4] = size
+        for call in (module.rhs, module.jacobian, lambda t, x: module.project(x)):
+            refuses("EG-NOT-FINITE f_e0 f_e3 1", call, 0.0, x)
+    x[first : first + 4] = [1e-30, 0, 0, 0]  # of any length but zero
+    module.rhs(0.0, x)
+    batch = np.stack([x, x], axis=1)
+    batch[first, 1] = 0.0
+    refuses("EG-NOT-FINITE f_e0 f_e3", module.rhs, 0.0, batch)
+    for name, value in (("f_e2", np.nan), ("f_wy", np.inf)):
+        x = np.array(start)
+        x[module.x_names.index(name)] = value
+        for call in (module.rhs, module.jacobian):
+            refuses(f"EG-NOT-FINITE {name}", call, 0.0, x)
+    x = np.array(start)
+    x[0] = np.nan  # no acceleration depends on it
+    refuses("EG-NOT-FINITE f_x", module.simulate, 1.0, initial=x)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (
+            lambda m: m.joint("free", "g", "ground", "b", rotation="quaternion"),
+            "EG-CHOICE joints.g.rotation: euler_parameters",
+        ),
+        (lambda m: m.torque("t", "f_e1", 1.0), "EG-REFERENCE forces.t.joint: 'f_e1' body"),
+        (lambda m: m.initial(f_e0_dot=1.0), "EG-NAME-UNKNOWN initial.f_e0_dot: f_wx"),
+        (lambda m: m.parameter("f_wx", 1.0), "EG-NAME-TAKEN joints.f: 'f_wx'"),
+        (lambda m: m.initial(f_e0=0.9, f_e1=0.9), "EG-CONTRADICTION f_e0 0.9 1.27279"),
+        (lambda m: m.independent("f_e0"), "EG-PARTITION independent: 'f_e0' f_wx"),
+    ],
+)
+def test_faults_of_descriptions(change: Any, fault: str) -> None:
+    m = stone()
+    change(m)
+    refuses(fault, m.check)
+
+
+def rssr(rotation: str) -> eg.Model:
+    m = eg.Model("rssr", gravity=(0, 0, -9.81))
+    crank = m.body("crank", mass=1.0, com=(0.05, 0, 0), inertia=(1e-3, 2e-3, 2e-3))
+    rod = m.body("rod", mass=0.7, com=(0.2, 0.01, 0), inertia=(1e-4, 3e-3, 3.1e-3))
+    rocker = m.body("rocker", mass=0.9, com=(0.1, 0, 0), inertia=(1e-3, 4e-3, 4e-3))
+    m.revolute("A", m.ground, crank, coordinate="th")
+    m.spherical("S", crank.at(0.1, 0, 0), rod, rotation=rotation)
+    m.revolute("D", m.ground.at(0.4, 0.1, 0.05), rocker, axis="y", coordinate="ph")
+    m.spherical("T", rod.at(0.4, 0, 0), rocker.at(0.25, 0, 0), rotation=rotation)
+    m.initial(th=0.3, th_dot=5.0)
+    m.damper("d", m.ground.at(0.1, 0.1, 0.1), rod.at(0.3, 0, 0), damping=0.4)
+    for k, axis in enumerate("xyz"):
+        point = rod.at(0.2, 0.1, 0.05)
+        m.output(f"a{axis}", point.acceleration[k])
+    return m
+
+
+def as_parameters(angles: Any, parameters: Any, x: np.ndarray) -> np.ndarray:
+    """A state of the model in Euler angles as one in Euler parameters, by poses and their rates."""
+    named = dict(zip(angles.x_names, x, strict=True))
+
+    def relative(q: np.ndarray) -> np.ndarray:
+        crank, rod = angles.poses(q)[:2, :3, :3]
+        return crank.T @ rod
+
+    q, v, h = x[: angles.n_q], x[angles.n_q :], 1e-3
+    R = relative(q)
+    weights = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+    R_dot = sum(c * (relative(q + k * h * v) - relative(q - k * h * v)) for k, c in enumerate(weights, 1)) / h
+    W = R.T @ R_dot
+    named |= {f"S_e{k}": y for k, y in enumerate(rotations.from_matrix(R))}
+    named |= {"S_wx": W[2, 1], "S_wy": W[0, 2], "S_wz": W[1, 0]}
+    return np.array([named[name] for name in parameters.x_names])
+
+
+def test_loops_in_parameters_are_those_in_angles() -> None:
+    """Outputs, energies and runs agree; accelerations are those of multipliers, the Jacobian that of differences."""
+    angles, parameters = (rssr(kind).compile(target="numpy") for kind in ("euler_angles", "euler_parameters"))
+    by_lagrange = rssr("euler_parameters").compile("lagrange", target="numpy", kernels=["rhs"])
+    n = parameters.n_q
+    for th, spin in ((0.3, 0.0), (-0.4, -3.0)):
+        x = angles.x0(th=th, th_dot=5.0, S_1_dot=spin)
+        y = as_parameters(angles, parameters, x)
+        np.testing.assert_allclose(parameters.project(y), y, atol=1e-9)
+        np.testing.assert_allclose(parameters.outputs(0.0, y), angles.outputs(0.0, x), rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(parameters.energy(y), angles.energy(x), rtol=1e-9)
+        y = parameters.project(y)
+        x_dot = parameters.rhs(0.0, y)
+        np.testing.assert_allclose(by_lagrange.rhs(0.0, y), x_dot, rtol=0, atol=1e-9 * np.abs(x_dot).max())
+        q_dot = rotations.coordinate_rates(parameters.metadata, y[:n], y[n:])
+        np.testing.assert_allclose(x_dot[:n], q_dot, atol=1e-12)
+
+        def rates(columns: np.ndarray, v: np.ndarray = y[n:]) -> np.ndarray:
+            return np.einsum("ijk,j->ik", parameters.constraint_jacobian(columns, rows="all"), v)
+
+        C_q, gamma = parameters.constraint_jacobian(y[:n], rows="all"), judges.first(rates, y[:n], q_dot)
+        a = judges.augmented(parameters.mass_matrix(y[:n]), parameters.bias(0.0, y), C_q, gamma)
+        np.testing.assert_allclose(x_dot[n:], a, atol=1e-8 * np.abs(a).max())
+        J, h = parameters.jacobian(0.0, y), 1e-6
+        slopes = [(parameters.rhs(0.0, y + h * e) - parameters.rhs(0.0, y - h * e)) / (2 * h) for e in np.eye(len(y))]
+        np.testing.assert_allclose(J, np.array(slopes).T, atol=3e-7 * np.abs(J).max())
+        scaled = np.array(y)
+        scaled[[name[-3:-1] == "_e" for name in parameters.x_names]] *= 1.7  # the length of e means nothing
+        np.testing.assert_allclose(parameters.rhs(0.0, scaled)[n:], x_dot[n:], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(parameters.project(scaled), y, atol=1e-12)
+    runs = [one.simulate(0.2, initial=start, rtol=1e-10, atol=1e-12) for one, start in ((angles, x), (parameters, y))]
+    for name in ("th", "ph", "ax", "energy"):
+        assert runs[1][name][-1] == pytest.approx(runs[0][name][-1], rel=1e-6, abs=1e-6)
+    e = np.array([runs[1][f"T_e{k}"][-1] for k in range(4)])  # of the joint that was cut
+    rod, rocker = parameters.poses(runs[1].x[:n, -1])[1:, :3, :3]
+    np.testing.assert_allclose(rotations.matrix(e), rod.T @ rocker, atol=1e-10)

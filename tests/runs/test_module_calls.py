@@ -5,10 +5,12 @@ import math
 import sys
 import threading
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import models
+import mujoco
 import numpy as np
 import pytest
 from analysed import compiled
@@ -270,3 +272,221 @@ def test_a_wrong_name_is_reported_with_the_nearest(held: dict[str, Any], kind: s
         assert not hasattr(held[kind], name)
         assert getattr(held[kind], name, 3) == 3
     refuses(f"EG-UNAVAILABLE {kind} 'zzz'", getattr, held[kind], "zzz")
+
+
+# -- calls and outputs that sum over all bodies ------------------------------------------------------------------------
+XML = """
+<mujoco><option gravity="0 0 0"/><worldbody>
+ <body name="a" pos="0.1 0.2 0.3"><joint type="hinge" axis="0 0 1"/><inertial pos="0.1 -0.2 0.3" mass="2"
+   fullinertia="0.3 0.4 0.5 0.01 0.02 0.03"/>
+  <body name="b" pos="0.4 0.1 -0.2"><joint type="slide" axis="1 0 0"/><inertial pos="0.2 0.1 0" mass="1.5"
+    fullinertia="0.2 0.25 0.3 0 -0.02 0.01"/></body>
+  <body name="c" pos="-0.3 0.2 0.1"><joint type="hinge" axis="0 1 0"/><inertial pos="0 0.3 0.1" mass="0.7"
+    fullinertia="0.1 0.15 0.12 0.01 0 0"/></body>
+ </body></worldbody></mujoco>
+"""
+
+
+@cache
+def tree(target: str = "numpy"):
+    m = eg.Model("tree")
+
+    def tensor(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> dict[str, float]:
+        return {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "xz": xz, "yz": yz}
+
+    a = m.body("a", mass=m.parameter("m_a", 2), com=(0.1, -0.2, 0.3), inertia=tensor(0.3, 0.4, 0.5, 0.01, 0.02, 0.03))
+    b = m.body("b", mass=1.5, com=(0.2, 0.1, 0), inertia=tensor(0.2, 0.25, 0.3, 0, -0.02, 0.01))
+    c = m.body("c", mass=0.7, com=(0, 0.3, 0.1), inertia=tensor(0.1, 0.15, 0.12, 0.01, 0, 0))
+    m.revolute("J1", m.ground.at(0.1, 0.2, 0.3), a)
+    m.prismatic("J2", a.at(0.4, 0.1, -0.2), b, axis="x")
+    m.revolute("J3", a.at(-0.3, 0.2, 0.1), c, axis="y")
+    com = m.center_of_mass
+    for name, values in {
+        "r": com.position, "v": com.velocity, "a": com.acceleration, "p": m.momentum,
+        "L": m.angular_momentum(), "O": m.angular_momentum(m.ground), "B": m.angular_momentum(b.at(0.1, 0, 0)),
+        "I": [x for row in m.inertia_about() for x in row], "G": [x for row in m.inertia_about(m.ground) for x in row],
+        "M": [m.total_mass], "E": [m.total_energy],
+    }.items():  # fmt: skip
+        for k, value in enumerate(values):
+            m.output(f"{name}{k}", value)
+    return m.compile(target=target)
+
+
+def states(mod, count: int = 4) -> np.ndarray:
+    return np.random.default_rng(5).uniform(-1, 1, (mod.n_x, count))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_calls_and_outputs_equal_mujoco(target: str) -> None:
+    mod = tree(target)
+    world = mujoco.MjModel.from_xml_string(XML)
+    data = mujoco.MjData(world)
+    order = [mod.q_names.index(name) for name in ("J1", "J2", "J3")]
+    for x in states(mod).T:
+        q, v = x[:3], x[3:]
+        data.qpos[:], data.qvel[:] = q[order], v[order]
+        mujoco.mj_forward(world, data)
+        mujoco.mj_subtreeVel(world, data)
+        com, velocity, angular = data.subtree_com[1], data.subtree_linvel[1], data.subtree_angmom[1]
+        close = {"rtol": 1e-12, "atol": 1e-13}
+        np.testing.assert_allclose(mod.center_of_mass(q), com, **close)
+        np.testing.assert_allclose(mod.com_jacobian(q) @ v, velocity, **close)
+        np.testing.assert_allclose(mod.momentum(x), [*(4.2 * velocity), *angular], **close)
+        y = dict(zip(mod.y_names, mod.outputs(0.0, x), strict=True))
+
+        def of(name: str, n: int = 3, y: dict[str, float] = y) -> np.ndarray:
+            return np.array([y[f"{name}{k}"] for k in range(n)])
+
+        np.testing.assert_allclose(of("r"), com, **close)
+        np.testing.assert_allclose(of("v"), velocity, **close)
+        np.testing.assert_allclose(of("p"), 4.2 * velocity, **close)
+        np.testing.assert_allclose(of("L"), angular, **close)
+        np.testing.assert_allclose(of("O"), angular + np.cross(com, 4.2 * velocity), **close)
+        b = mod.poses(q)[mod.body_names.index("b")]
+        point = b[:3, :3] @ [0.1, 0, 0] + b[:3, 3]
+        np.testing.assert_allclose(of("B"), angular + np.cross(com - point, 4.2 * velocity), **close)
+        inertia = sum(
+            data.ximat[k].reshape(3, 3) @ np.diag(world.body_inertia[k]) @ data.ximat[k].reshape(3, 3).T
+            + world.body_mass[k] * (d @ d * np.eye(3) - np.outer(d, d))
+            for k in (1, 2, 3)
+            for d in [data.xipos[k] - com]
+        )
+        np.testing.assert_allclose(mod.centroidal_inertia(q), inertia, **close)
+        np.testing.assert_allclose(of("I", 9).reshape(3, 3), inertia, **close)
+        about_ground = inertia + 4.2 * (com @ com * np.eye(3) - np.outer(com, com))
+        np.testing.assert_allclose(of("G", 9).reshape(3, 3), about_ground, **close)
+        assert y["M0"] == pytest.approx(4.2)
+        assert y["E0"] == pytest.approx(sum(mod.energy(x)))
+
+
+# -- names -------------------------------------------------------------------------------------------------------------
+def pendulum(text: str, mass: object = 1, body: str = "bob") -> eg.Model:
+    m = eg.Model("p")
+    m.revolute("q", m.ground, m.body(body, mass=mass, com=(1, 0, 0), inertia={"zz": 1}))
+    m.output("y", text)
+    return m
+
+
+@pytest.mark.parametrize("text", ["x(com)", "total_mass"])
+def test_a_mechanism_without_mass_has_no_sums(text: str) -> None:
+    refuses("EG-NO-INERTIA outputs", lambda: pendulum(text, mass=0).check())
+
+
+# -- calls of derivatives ----------------------------------------------------------------------------------------------
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def ball_and_hinge(turned: float = 0.0) -> eg.Model:
+    """A ball joint in Euler parameters and a hinge with a motor; `turned` turns the frame of the first body."""
+    m = eg.Model("ball_and_hinge", gravity=(0, 0, -9.81))
+    length = m.parameter("l", 0.5)
+    m.input("tau", 0.3)
+    c, s = np.cos(turned), np.sin(turned)
+    inertia = {"xx": 0.02, "yy": 0.03, "zz": 0.015}
+    if turned:
+        inertia = {"xx": 0.02 * c * c + 0.03 * s * s, "yy": 0.02 * s * s + 0.03 * c * c, "zz": 0.015}
+        inertia["xy"] = (0.03 - 0.02) * s * c
+    upper = m.body("upper", mass=1.5, com=(0, 0, "-l/2"), inertia=inertia)
+    lower = m.body("lower", mass=0.8, com=(0.1, 0, -0.2), inertia={"xx": 0.01, "yy": 0.01, "zz": 0.002})
+    frame = {"rpy": (0, 0, -turned)} if turned else {}
+    m.spherical("ball", m.ground, upper.marker("top", at=(0, 0, 0), **frame), rotation="euler_parameters")
+    hinge = m.revolute("hinge", upper.marker("end", at=(0, 0, -length), **frame), lower, axis="y", coordinate="b")
+    m.actuator("motor", joint=hinge, value="tau*cos(b)")
+    m.joint_damper("friction", joint=hinge, damping=0.1)
+    return m
+
+
+def state(module: Any, seed: int = 0, columns: tuple[int, ...] = ()) -> tuple[np.ndarray, ...]:
+    random = np.random.default_rng(seed)
+    q, v, a = (random.uniform(-1, 1, (n, *columns)) for n in (module.n_q, module.n_v, module.n_v))
+    return q, v, a
+
+
+def slope(f: Any, h: float = 1e-3) -> np.ndarray:
+    """f'(0) by central differences, extrapolated twice."""
+    d = [(f(k * h) - f(-k * h)) / (2 * k * h) for k in (1, 2, 4)]
+    first = [(4 * d[0] - d[1]) / 3, (4 * d[1] - d[2]) / 3]
+    return np.asarray((16 * first[0] - first[1]) / 15)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_derivatives_are_slopes_of_the_calls(target: str) -> None:
+    module = ball_and_hinge().compile(target=target)
+    q, v, a = state(module)
+    found = module.inverse_dynamics_derivatives(q, v, a)
+    assert found.dtau_dq.shape == (4, 5)
+    np.testing.assert_allclose(found.dtau_da, module.mass_matrix(q), atol=1e-14)
+    for mine, place in zip(found, range(3), strict=True):
+        for k, column in enumerate(mine.T):
+
+            def along(e: float, place: int = place, k: int = k) -> np.ndarray:
+                moved = [q.copy(), v.copy(), a.copy()]
+                moved[place][k] += e
+                return np.asarray(module.inverse_dynamics(*moved))
+
+            np.testing.assert_allclose(column, slope(along), atol=1e-9)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_jacobian_differentiates_by_what_is_named(target: str) -> None:
+    module = compiled("slider_crank", target)
+    x = module.x0()
+    np.testing.assert_array_equal(module.jacobian(0.0, x, wrt="x"), module.jacobian(0.0, x))
+    np.testing.assert_array_equal(module.jacobian(0.0, x, wrt="u"), module.input_jacobian(0.0, x))
+    by_p = module.jacobian(0.0, x, wrt="p")
+    np.testing.assert_array_equal(by_p, module.parameter_jacobian(0.0, x))
+    assert by_p.shape == (module.n_x, module.n_p)
+    out = np.empty((module.n_x, module.n_u))
+    assert module.jacobian(0.0, x, out=out, wrt="u") is out
+    refuses("EG-SHAPE x q", module.jacobian, 0.0, x, wrt="q")
+
+
+@pytest.mark.parametrize("name", [pytest.param("puma560", marks=pytest.mark.thorough), "slider_crank"])
+def test_states_side_by_side_have_the_bits_of_one_alone(name: str) -> None:
+    """Eleven columns: lanes of the processor, and a rest that does not fill them."""
+    module = compiled(name, "cython")
+    random = np.random.default_rng(5)
+    x = module.project(module.x0()[:, None] + 0.1 * random.uniform(-1, 1, (module.n_x, 11)))
+    q, v, a = x[: module.n_q], x[module.n_q :], random.uniform(-1, 1, (module.n_v, 11))
+    first = module.inverse_dynamics_derivatives(q, v, a)
+    for k in range(11):
+        for mine, theirs in zip(first, module.inverse_dynamics_derivatives(q[:, k], v[:, k], a[:, k]), strict=True):
+            np.testing.assert_array_equal(mine[..., k], theirs)
+
+
+def strip(cells: int) -> eg.Model:
+    """Two wheels, each by itself, on a strip of soil with cells of 3 cm."""
+    m = eg.Model("strip", gravity=(0, -9.81, 0))
+    for k in (0, 1):
+        m.body(f"wheel{k}", mass=100.0, inertia={"zz": 10.0})
+        m.planar(f"j{k}", m.ground, f"wheel{k}")
+        m.initial(**{f"j{k}_y": 0.49, f"j{k}_x": 0.9 - 0.5 * k, f"j{k}_x_dot": 1.0, f"j{k}_3_dot": -2.2})
+    wheels = [{"shape": "circle", "on": f"wheel{k}", "radius": 0.5, "width": 0.3} for k in (0, 1)]
+    bed = {"shape": "bed", "on": m.ground, "length": 0.03 * cells, "cells": cells}
+    m.contacts("sand", wheels, bed, {"soil": "dry_sand", "dissipation": 1.0})
+    return m
+
+
+@pytest.fixture(scope="module")
+def soil() -> tuple[eg.Module, np.ndarray]:
+    """The strip and a state in which the wheels stand in ruts."""
+    mod = strip(60).compile()
+    return mod, mod.simulate((0, 0.11), method="DOP853", rtol=1e-9).x[:, -1]
+
+
+def test_columns_of_cells_by_differences(soil: Any) -> None:
+    """Where differences of both sides agree: elsewhere a law turns, as that of the size of a shear that is 0."""
+    mod, x = soil
+    J, here, smooth, touched = mod.jacobian(0.0, x), mod.rhs(0.0, x), 0, 0
+    for k in range(12, mod.n_x):
+        e = np.zeros(len(x))
+        e[k] = 1e-7
+        ahead, back = ((mod.rhs(0.0, x + s * e) - here) / (s * e[k]) for s in (1.0, -1.0))
+        size = np.abs(ahead).max()
+        if np.abs(ahead - back).max() > 1e-3 * size:
+            continue
+        smooth += 1
+        touched += np.count_nonzero(ahead[6:12]) > 0
+        np.testing.assert_allclose(J[:, k], (ahead + back) / 2.0, atol=2e-5 * size + 1e-6)
+    assert smooth > 150
+    assert touched > 30
