@@ -1,7 +1,5 @@
 """Contact with closed outlines: distances and overlaps by brute force, loops, frames, sprockets, what is wrong."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

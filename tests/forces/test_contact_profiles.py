@@ -1,7 +1,5 @@
 """Contact with profiles and height fields: flat and round ones, distances by brute force, runs, what is wrong."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

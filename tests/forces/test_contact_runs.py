@@ -1,7 +1,5 @@
 """Runs with contacts: none is stepped over at default tolerances, deep starts are reported; judged by geometry."""
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from functools import cache

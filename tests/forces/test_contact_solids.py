@@ -1,7 +1,5 @@
 """Contact of shapes in space: known normals, distances by search, slopes of the energy, special cases, MuJoCo, rest."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

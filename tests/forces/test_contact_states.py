@@ -1,7 +1,5 @@
 """States of pairs in groups of contacts: names and numbers, laws, derivatives, order, several sides, rest on slopes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import contact_scenes as scenes

@@ -1,7 +1,5 @@
 """Contacts beside MuJoCo, Exudyn and published waves of dominoes, and in closed chains."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Contact of shapes in the plane: geometry in NumPy, pairs one by one, momentum, energy, closed forms, stacks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations_with_replacement
 from typing import Any

@@ -1,7 +1,5 @@
 """Components are what the same model written out by hand is; their faults; names with dots at every door."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Callable
