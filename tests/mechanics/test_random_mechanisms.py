@@ -490,6 +490,8 @@ def test_chains_that_any_joint_closes(kind: str, rotation: str) -> None:
     module, x = balance.module, balance.x
     if kind not in ("weld", "screw"):
         assert module.metadata["loop_joint_names"] == ["close"]
+        here = dict(zip(module.q_names, module.x0()[: module.n_q], strict=True))
+        assert here == pytest.approx(balance.made.numbers.start, abs=1e-9)  # a pose that the joint allows
     assert module.n_dof == 8 - (6 - CLOSING[kind][0])
     assert sized(module.constraints(x[: module.n_q], rows="all")) <= 1e-12
     assert sized(module.velocity_constraints(x, rows="all")) <= 1e-11
