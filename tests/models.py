@@ -292,6 +292,16 @@ def every_joint() -> eg.Model:
     return m
 
 
+def switched_by_lever(speed: float) -> eg.Model:
+    """A sledge that is pushed by 0.25 m/s where the input ``lever`` less 0.5 and its place together pass zero."""
+    m = eg.Model("switched")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.torque("nothing", "J", 0 * m.input("lever"))
+    m.initial(s=0.0, s_dot=speed)
+    m.event("on", "lever - 0.5 + s", direction=1, reset={"s_dot": "s_dot + 0.25"})
+    return m
+
+
 def sampled_servo() -> eg.Model:
     """A sledge on a digital controller with integral part."""
     m = eg.Model("sampled_servo", gravity=(0, 0, 0))

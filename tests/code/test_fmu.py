@@ -139,12 +139,7 @@ def test_an_input_that_jumps_over_an_event_resets_once(speed: float, version: st
 
     In either kind of unit and in the closed form.
     """
-    m = eg.Model("switched")
-    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
-    m.torque("nothing", "J", 0 * m.input("lever"))
-    m.initial(s=0.0, s_dot=speed)
-    m.event("on", "lever - 0.5 + s", direction=1, reset={"s_dot": "s_dot + 0.25"})
-    path = m.derive().write_fmu(tmp_path / "m.fmu", version)
+    path = models.switched_by_lever(speed).derive().write_fmu(tmp_path / "m.fmu", version)
     jump = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (2.0, 1.0)], dtype=[("time", float), ("lever", float)])
     for kind in ("CoSimulation", "ModelExchange"):
         rows = simulate_fmu(str(path), fmi_type=kind, stop_time=2.0, output_interval=0.1, input=jump, output=["s"])

@@ -440,53 +440,6 @@ def test_ida_finds_the_trajectories_of_embedding(name: str, end: float, first: f
     assert errors[1] <= min(last, 0.3 * errors[0])
 
 
-# -- Events of IDA's runs ----------------------------------------------------------------------------------------------
-G = 9.81
-
-
-def ball(**floor: Any) -> Any:
-    m = eg.Model("ball", gravity=(0, -G, 0))
-    e = m.parameter("e", 0.9)
-    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
-    m.initial(h=1.0)
-    m.event("floor", "h", **({"direction": -1, "reset": {"h_dot": -e * m.coordinate("h_dot")}} | floor))
-    m.event("apex", "h_dot", direction=-1)
-    return m.compile(target="numpy")
-
-
-@pytest.fixture(scope="module")
-def bouncing() -> Any:
-    pytest.importorskip("sksundae")
-    return ball()
-
-
-def hits(e: float, count: int) -> np.ndarray:
-    first, rest = np.sqrt(2 / G), 2 * np.sqrt(2 / G) * e ** np.arange(1, count)
-    return np.cumsum([first, *rest])
-
-
-def test_a_ball_bounces_as_in_closed_form(bouncing: Any) -> None:
-    run = bouncing.dae.solve((0, 2.8), rtol=1e-9, atol=1e-11)
-    times = hits(0.9, 4)
-    np.testing.assert_allclose(run.t_events["floor"], times, atol=1e-9)
-    assert run.t_events["apex"][0] == 0.0
-    np.testing.assert_allclose(run.t_events["apex"][1:], (times[:-1] + times[1:]) / 2, atol=1e-9)
-    np.testing.assert_allclose(run.x_events["floor"][1], -np.sqrt(2 * G) * 0.9 ** np.arange(4), rtol=1e-8)
-    assert run["h"].min() > -1e-9
-    twice = np.flatnonzero(np.diff(run.t) == 0.0)
-    assert len(twice) == 4
-    np.testing.assert_allclose(run["h_dot"][twice + 1], -0.9 * run["h_dot"][twice], rtol=1e-12)
-    asked = np.linspace(0.0, 2.8, 13)
-    at = bouncing.dae.solve((0, 2.8), t_eval=asked, rtol=1e-9, atol=1e-11)
-    np.testing.assert_array_equal(at.t, asked)
-    last = np.searchsorted(times, asked) - 1
-    after, up = (
-        asked - np.where(last < 0, 0.0, times[last]),
-        np.where(last < 0, 0.0, np.sqrt(2 * G) * 0.9 ** (last + 1.0)),
-    )
-    np.testing.assert_allclose(at["h"], np.where(last < 0, 1.0, 0.0) + up * after - G * after**2 / 2, atol=1e-8)
-
-
 # -- Reactions as unknowns ---------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("method", ["newton_euler", "amalgamated", "embedding"])
 def test_the_ground_carries_the_change_of_momentum(method: str) -> None:
