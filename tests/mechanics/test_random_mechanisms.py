@@ -321,6 +321,7 @@ class Balance:
         free = null_space(C_q, rcond=1e-9) if len(C_q) else np.eye(module.n_v)
         assert free.shape[1] == module.n_dof
         assert sized(expected @ free) <= 1e-9 * size
+        assert sized(expected + C_q.T @ module.multipliers(TIME, self.x)) <= 1e-8 * size
         assert sized(C_q @ m.a + gamma(module, self.x, m.q_dot)) <= 1e-9 * max(1.0, sized(m.a), sized(m.v**2))
         for name, reaction in zip(module.joint_names, module.reactions(TIME, self.x), strict=True):
             moves = self.relative(name, range(module.n_v))[0] @ free

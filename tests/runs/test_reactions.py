@@ -7,12 +7,11 @@ import models
 import numpy as np
 import pinocchio as pin
 import pytest
-import rotations
 import scipy.linalg
 import sympy
 import yaml
 from analysed import compiled
-from random_models import SPATIAL, Made, Placement, random_recipe
+from random_models import Made, Placement, random_recipe
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 
@@ -21,12 +20,9 @@ import eomgen as eg
 G = 9.81
 
 
-def described(model: eg.Model) -> tuple[judges.RigidBodies, dict[str, Any]]:
-    """Bodies of a model without parameters, and its joints: type, predecessor, its marker, successor, its marker."""
+def joints_of(model: eg.Model) -> dict[str, Any]:
+    """Joints of a model without parameters: type, predecessor, its marker, successor, its marker."""
     text = yaml.safe_load(model.to_yaml())
-    entries = list(text["bodies"].values())
-    masses, centers = (np.array([e[key] for e in entries], dtype=float) for key in ("mass", "com"))
-    inertias = [np.diag(i) if np.ndim(i) == 1 else np.array(i) for i in (e["inertia"] for e in entries)]
     names = ["ground", *text["bodies"]]
 
     def marker(place: Any) -> tuple[int, Placement]:
@@ -34,28 +30,19 @@ def described(model: eg.Model) -> tuple[judges.RigidBodies, dict[str, Any]]:
         R = models.rotation(given.get("rpy", (0.0, 0.0, 0.0)))
         return names.index(given["body"]) - 1, Placement(R, np.array(given.get("at", np.zeros(3)), dtype=float))
 
-    joints = {name: (e["type"], *(x for place in e["between"] for x in marker(place)))
-              for name, e in text["joints"].items()}  # fmt: skip
-    return judges.RigidBodies(masses, centers, np.array(inertias), np.array(text["gravity"])), joints
+    return {name: (e["type"], *(x for place in e["between"] for x in marker(place)))
+            for name, e in text["joints"].items()}  # fmt: skip
 
 
 class Balance:
     """What must act on each body at a state, ``needed`` (k, 6): force and moment about its origin, from poses alone."""
 
     def __init__(self, model: eg.Model, module: Any, x: np.ndarray) -> None:
-        rigid, joints = described(model)
-        self.module, self.x, self.joints = module, x, [joints[name] for name in module.joint_names]
-        q, v = x[: module.n_q], x[module.n_q :]
+        rigid, joints = judges.described(model), joints_of(model)
+        self.joints = [joints[name] for name in module.joint_names]
         a = module.rhs(0.0, x)[module.n_q :]
-
-        def rates(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            return rotations.coordinate_rates(module.metadata, q, v)
-
-        q_dot = rates(q, v)
-        q_ddot = rates(q, a) + rates(q_dot, v) - rates(0 * q_dot, v)  # q' = N v, N linear in Euler parameters
-        self.bodies = b = judges.Bodies(module, q, q_dot)
-        self.N = np.array([rates(q, e) for e in np.eye(module.n_v)]).T
-        w_dot, r_ddot = b.w_dot + b.J_w @ q_ddot, b.r_ddot + b.J_r @ q_ddot
+        self.bodies = b = judges.Bodies(module, x[: module.n_q], x[module.n_q :])
+        w_dot, r_ddot = b.w_dot + b.J_w @ a, b.r_ddot + b.J_r @ a
         self.needed = np.zeros((len(rigid.masses), 6))
         for k, mass in enumerate(rigid.masses):
             arm, w = b.R[k] @ rigid.centers[k], b.w[k]
@@ -78,44 +65,6 @@ class Balance:
             if body >= 0:
                 arm = point - self.bodies.r[body]
                 total[body] += sign * np.concatenate([wrench[:3], wrench[3:] + np.cross(arm, wrench[:3])])
-
-    def relative(self, joint: Any) -> np.ndarray:
-        """Velocity of S against P at S, and angular velocity, per generalized velocity (6, n_v), ground axes."""
-        _, i, _, j, S = joint
-        _, point = self.place(j, S)
-        result = np.zeros((6, self.module.n_v))
-        for k, sign in ((j, 1.0), (i, -1.0)):
-            if k >= 0:
-                turn = self.bodies.J_w[k] @ self.N
-                result[:3] += sign * (self.bodies.J_r[k] @ self.N + np.cross(turn.T, point - self.bodies.r[k]).T)
-                result[3:] += sign * turn
-        return result
-
-    def check(self, found: np.ndarray) -> None:
-        """Reactions balance every body, and do no work in any free motion."""
-        module, exerted, size = self.module, np.zeros_like(self.needed), np.abs(self.needed).max()
-        for joint, wrench in zip(self.joints, found, strict=True):
-            self.add(exerted, joint, wrench)
-        np.testing.assert_allclose(exerted, self.needed, atol=1e-8 * size, rtol=0)
-        q, free = self.x[: module.n_q], np.eye(module.n_v)
-        if module.n_rows:
-            C_q = module.constraint_jacobian(q, rows="all")
-            free = scipy.linalg.null_space(C_q, rcond=1e-9)
-            held = C_q.T @ module.multipliers(0.0, self.x)  # M a + h + C_q^T l = 0
-            motion = module.mass_matrix(q) @ module.rhs(0.0, self.x)[module.n_q :] + module.bias(0.0, self.x)
-            np.testing.assert_allclose(motion + held, 0.0, atol=1e-8 * size, rtol=0)
-        for joint, wrench in zip(self.joints, found, strict=True):
-            np.testing.assert_allclose(wrench @ self.relative(joint) @ free, 0.0, atol=1e-8 * size, rtol=0)
-
-
-@pytest.mark.parametrize(("seed", "planar"), [(20, False), (22, False), (23, True), (24, True)])
-def test_every_body_of_random_loops(seed: int, planar: bool) -> None:
-    kinds = ["revolute", "prismatic", "revolute", "planar"] if planar else SPATIAL
-    chosen = ["revolute", *np.random.default_rng(seed).choice(kinds, 4).tolist()]
-    made = Made(random_recipe(seed, chosen, planar=planar, closing="revolute" if planar else "spherical", cut=5))
-    module = made.compile()
-    x = judges.random_states(module, seed, 1)[0]
-    Balance(made.model, module, x).check(module.reactions(0.0, x))
 
 
 def slider_crank(cut: str = "C", drives: dict[str, float] | None = None) -> eg.Model:
