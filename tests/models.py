@@ -1,7 +1,7 @@
 """Models that tests share: the shipped examples by name, variations on them, small ones of kinds that none is of."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,23 +15,10 @@ from eomgen.toolchain.compiler import lane_width
 TESTS = Path(__file__).parent
 EXAMPLES = TESTS.parent / "examples"
 EXAMPLE_NAMES = (
-    "pendulum",
-    "double_pendulum",
-    "two_link_manipulator",
-    "slider_crank",
-    "four_bar",
-    "peaucellier",
-    "chain",
-    "cart_pendulum",
-    "spherical_pendulum",
-    "andrews_squeezer",
-    "planetary_gear",
-    "cam_follower",
-    "rolling_disc",
-    "bicycle",
-    "bricard",
-    "n_four_bar",
-)
+    "pendulum", "double_pendulum", "two_link_manipulator", "slider_crank", "four_bar", "peaucellier", "chain",
+    "cart_pendulum", "spherical_pendulum", "andrews_squeezer", "planetary_gear", "cam_follower", "rolling_disc",
+    "bicycle", "bricard", "n_four_bar",
+)  # fmt: skip
 #: Partly driven ones, which the Newton-Euler judge does not know.
 DRIVEN_NAMES = ("car_axis", "kapitza_pendulum")
 TABLE = ([0.0, 0.05, 0.11, 0.2, 1.0], [1.0, -2.0, 3.0, 5.0, 7.0])
@@ -67,6 +54,26 @@ def reference(name: str) -> Any:
     return json.loads((TESTS / "reference" / f"{name}.json").read_text(encoding="utf-8"))
 
 
+def join_slider_crank(m: eg.Model, bars: Sequence[Any], r: Any, l: Any, names: str, guide: str = "D") -> None:
+    """Joints of crank, rod and slider along x; names of the coordinates of A, B and the guide, - for none."""
+    crank, rod, slider = bars
+    first, second, last = ({} if name == "-" else {"coordinate": name} for name in names.split())
+    m.revolute("A", m.ground, crank, **first)
+    m.revolute("B", crank.at(r, 0, 0), rod, **second)
+    m.revolute("C", rod.at(l, 0, 0), slider)
+    m.prismatic(guide, m.ground, slider, axis="x", **last)
+
+
+def join_four_bar(m: eg.Model, bars: Sequence[Any], lengths: Sequence[Any], names: str) -> None:
+    """Hinges of crank, coupler and rocker of these lengths, then that of ground; names of A, B and D, - for none."""
+    (crank, coupler, rocker), (a, b, c, d) = bars, lengths
+    first, second, last = ({} if name == "-" else {"coordinate": name} for name in names.split())
+    m.revolute("A", m.ground, crank, **first)
+    m.revolute("B", crank.at(a, 0, 0), coupler, **second)
+    m.revolute("C", coupler.at(b, 0, 0), rocker.at(c, 0, 0))
+    m.revolute("D", m.ground.at(d, 0, 0), rocker, **last)
+
+
 def offset_slider_crank() -> eg.Model:
     """Slider-crank whose guide lies e above the crank's pivot; thin rods."""
     m = eg.Model("offset_slider_crank", gravity=(0, -9.81, 0))
@@ -92,10 +99,7 @@ def free_slider_crank() -> eg.Model:
     crank = m.body("crank", mass=p["m1"], com=(p["l1"] / 2, 0, 0), inertia={"zz": p["J1"]})
     rod = m.body("rod", mass=p["m2"], com=(p["l2"] / 2, 0, 0), inertia={"zz": p["J2"]})
     slider = m.body("slider", mass=p["m3"])
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(p["l1"], 0, 0), rod, coordinate="bend")
-    m.revolute("C", rod.at(p["l2"], 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="x")
+    join_slider_crank(m, (crank, rod, slider), p["l1"], p["l2"], "theta bend x")
     m.output("beta", "theta + bend")
     m.initial(theta=0, theta_dot=10)
     m.guess(bend=0, x=0.4)
@@ -211,10 +215,7 @@ def powered_slider_crank() -> eg.Model:
     crank = m.body("crank", mass=1.0, com=(r / 2, 0, 0), inertia={"zz": r**2 / 12})
     rod = m.body("rod", mass=0.8, com=(l / 2, 0, 0), inertia={"zz": 0.8 * l**2 / 12})
     slider = m.body("slider", mass=0.5)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(r, 0, 0), rod, coordinate="bend")
-    m.revolute("C", rod.at(l, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    join_slider_crank(m, (crank, rod, slider), r, l, "theta bend s")
     m.torque("motor", "A", m.input("tau", 1.5))
     m.spring("k1", m.ground.at(0.5, 0.2, 0), slider, stiffness=200, length=0.1)
     m.damper("c1", m.ground.at(0.5, 0.2, 0), slider, damping=2)
@@ -299,6 +300,31 @@ def switched_by_lever(speed: float) -> eg.Model:
     m.torque("nothing", "J", 0 * m.input("lever"))
     m.initial(s=0.0, s_dot=speed)
     m.event("on", "lever - 0.5 + s", direction=1, reset={"s_dot": "s_dot + 0.25"})
+    return m
+
+
+def rods(twice: bool = False) -> eg.Model:
+    """Two bodies on balls, held together by a rod, or two in one place: five freedoms."""
+    m = eg.Model("rods", gravity=(0.0, 0.0, -9.81))
+    l, torque = m.parameter("l", 1.1), m.input("torque", 0.4)
+    a = m.body("a", mass=1.2, com=(0.1, 0.2, -0.5), inertia=(0.2, 0.3, 0.15))
+    b = m.body("b", mass=0.8, com=(-0.1, 0.1, -0.4), inertia=(0.1, 0.2, 0.15))
+    m.spherical("A", m.ground, a, rotation="euler_parameters")
+    m.spherical("B", m.ground.at(1.0, 0.0, 0.0), b, rotation="euler_parameters")
+    m.distance("rod", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l)
+    if twice:
+        m.distance("second", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l + m.parameter("gap", 0.0))
+    m.torque("drive", a, (torque, 0, 0))
+    return m
+
+
+def rounded_wheel() -> eg.Model:
+    """A wheel with a round tread that rolls on ground."""
+    m = eg.Model("ring", gravity=(0, 0, -9.81))
+    wheel = m.body("wheel", mass=1, inertia=(0.05, 0.05, 0.09))
+    m.free("f", m.ground, wheel, sequence="zxz", coordinates=["x", "y", "z", "yaw", "lean", "spin"])
+    m.rolling("roll", wheel, m.ground, radius=0.3, tube=0.05)
+    m.initial(lean=1.2, yaw_dot=0.3, spin_dot=6.0, x=0, y=0, yaw=0, spin=0, lean_dot=0)
     return m
 
 

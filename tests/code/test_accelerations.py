@@ -31,21 +31,6 @@ class Case(NamedTuple):
     x: np.ndarray
 
 
-def rods(twice: bool = False) -> eg.Model:
-    """Two bodies on balls, held together by a rod, or two in one place: five freedoms."""
-    m = eg.Model("rods", gravity=(0.0, 0.0, -9.81))
-    l, torque = m.parameter("l", 1.1), m.input("torque", 0.4)
-    a = m.body("a", mass=1.2, com=(0.1, 0.2, -0.5), inertia=(0.2, 0.3, 0.15))
-    b = m.body("b", mass=0.8, com=(-0.1, 0.1, -0.4), inertia=(0.1, 0.2, 0.15))
-    m.spherical("A", m.ground, a, rotation="euler_parameters")
-    m.spherical("B", m.ground.at(1.0, 0.0, 0.0), b, rotation="euler_parameters")
-    m.distance("rod", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l)
-    if twice:
-        m.distance("second", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l + m.parameter("gap", 0.0))
-    m.torque("drive", a, (torque, 0, 0))
-    return m
-
-
 def five_bar() -> eg.Model:
     """Five links in a plane: two freedoms, of which neither is alone in M."""
     m = eg.Model("five_bar", gravity=(0.0, -9.81, 0.0))
@@ -109,8 +94,8 @@ def chain(n: int) -> eg.Model:
 CASES: dict[str, tuple[Callable[[], eg.Model], str, list[str]]] = {
     "slider_crank": (lambda: models.build("powered_slider_crank"), "embedding", KERNELS),
     "slider": (lambda: crank("s"), "embedding", []),
-    "balls": (rods, "embedding", [k for k in KERNELS if k != "kinematics"]),
-    "balls, reactions": (rods, "newton_euler", ["rhs", "project"]),
+    "balls": (models.rods, "embedding", [k for k in KERNELS if k != "kinematics"]),
+    "balls, reactions": (models.rods, "newton_euler", ["rhs", "project"]),
     "freedoms": (five_bar, "embedding", []),
     "freedoms, multipliers": (five_bar, "augmented", []),
     "lengths": (carriage, "embedding", []),
@@ -337,7 +322,7 @@ def test_a_tree_without_inertia_is_reported(name: str, parameters: tuple[float, 
 
 def test_a_gap_that_is_left_is_reported() -> None:
     """Two rods in one place whose lengths differ: half of the difference is left at either."""
-    mod = rods(twice=True).compile(target="numpy")
+    mod = models.rods(twice=True).compile(target="numpy")
     x, p, place = mod.x0(), np.array(mod.p), mod.p_names.index("gap")
     for gap in (0.0, 2e-11):
         p[place] = gap

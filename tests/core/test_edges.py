@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
+import models
 import numpy as np
 import pytest
 from refusals import refused, refuses
@@ -122,10 +123,7 @@ def test_independent_kept() -> None:
     m = eg.Model("two", gravity=(0, -9.81, 0))
     a, b, c = (m.body(n, mass=1, com=(x, 0, 0), inertia={"zz": 0.1}) for n, x in (("a", 0.2), ("b", 0.55), ("c", 0.4)))
     w = m.body("w", mass=1, inertia={"zz": 0.3})
-    m.revolute("A", m.ground, a, coordinate="q")
-    m.revolute("B", a.at(0.4, 0, 0), b, coordinate="s")
-    m.revolute("C", b.at(1.1, 0, 0), c.at(0.8, 0, 0))
-    m.revolute("D", m.ground.at(1.2, 0, 0), c, coordinate="r")
+    models.join_four_bar(m, (a, b, c), (0.4, 1.1, 0.8, 1.2), "q s r")
     m.revolute("E", m.ground, w, coordinate="e")
     m.guess(q=0.6, s=-0.2, r=1.5)
     m.initial(q=0.6)

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import models
 import numpy as np
 import pytest
 from refusals import refuses
@@ -150,10 +151,7 @@ def slider_crank(mu: float, pins: float) -> eg.Model:
     crank = m.body("crank", mass=1.0, inertia={"zz": 0.01}, com=(0.05, 0, 0))
     rod = m.body("rod", mass=0.8, inertia={"zz": 0.02}, com=(0.15, 0, 0))
     piston = m.body("piston", mass=0.5, inertia={"zz": 0.001})
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(0.1, 0, 0), rod)
-    m.revolute("C", rod.at(0.3, 0, 0), piston)
-    m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, piston), 0.1, 0.3, "theta - s", guide="S")
     m.initial(theta=0.8, theta_dot=20.0)
     m.guess(s=0.35)
     m.friction("guide", joint="S", coefficient=mu, smoothing=SMOOTH)
@@ -427,10 +425,7 @@ def test_reactions_beside_a_massless_rod():
     m = eg.Model("engine", gravity=(0, -G, 0))
     crank = m.body("crank", mass=1.0, inertia={"zz": 0.01})
     rod, piston = m.body("rod", mass=0.0), m.body("piston", mass=0.5)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(0.1, 0, 0), rod)
-    m.revolute("C", rod.at(0.3, 0, 0), piston)
-    m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, piston), 0.1, 0.3, "theta - s", guide="S")
     m.initial(theta=0.8, theta_dot=3.0)
     for name, text in (("pin", "reaction(B).x"), ("guide", "reaction(S).y"), ("push", "s_ddot")):
         m.output(name, text)

@@ -3,6 +3,7 @@
 from functools import cache
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 from refusals import refused
@@ -77,10 +78,7 @@ def slider_crank(target: str) -> Any:
     crank = m.body("crank", mass=1.0, com=(0.5, 0, 0), inertia={"zz": 0.1})
     rod = m.body("rod", mass=2.0, com=(0.5, 0, 0), inertia={"zz": 0.2})
     slider = m.body("slider", mass=0.5)
-    m.revolute("A", m.ground, crank, coordinate="th")
-    m.revolute("B", crank.at(1, 0, 0), rod, coordinate="b")
-    m.revolute("C", rod.at(1, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), 1, 1, "th b s")
     m.guess(th=0.5, b=-1.0, s=1.8)
     m.output("acceleration", "th_ddot")
     return m.compile(target=target)
@@ -139,10 +137,7 @@ def toggle(request: pytest.FixtureRequest) -> Any:
     inertia = m.parameter("inertia", 0.0)
     crank, rod = m.body("crank", mass=m.parameter("crank_mass", 0.0), inertia={"zz": inertia}), m.body("rod", mass=0)
     slider = m.body("slider", mass=MASS)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(R, 0, 0), rod)
-    m.revolute("C", rod.at(L, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), R, L, "theta - s")
     m.torque("motor", "A", TAU)
     m.initial(theta=1.0)
     return m.compile(independent=["theta"], target=request.param)

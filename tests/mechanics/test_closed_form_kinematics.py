@@ -176,10 +176,7 @@ def light_four_bar(mass: float, second: str = "ax") -> eg.Model:
     m = eg.Model("light_four_bar")
     inertia = {"inertia": {"zz": mass}} if mass else {}
     a, b, c = (m.body(name, mass=mass, **inertia) for name in ("crank", "coupler", "rocker"))
-    m.revolute("A", m.ground, a, coordinate="theta")
-    m.revolute("B", a.at(0.04, 0, 0), b, coordinate="bend")
-    m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
-    m.revolute("D", m.ground.at(0.1, 0, 0), c, coordinate="psi")
+    models.join_four_bar(m, (a, b, c), (0.04, 0.12, 0.08, 0.1), "theta bend psi")
     m.output("px", b.at(0.05, 0, 0).position[0])
     point = b.at(0.05, 0, 0)
     m.output(second, point.acceleration[0] if second == "ax" else point.velocity[0])

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 from refusals import refuses
@@ -72,10 +73,7 @@ def test_latch_on_a_closed_loop_against_the_impact_of_numpy() -> None:
     crank = m.body("crank", mass=1.0, inertia={"zz": 0.01}, com=(0.05, 0, 0))
     rod = m.body("rod", mass=0.8, inertia={"zz": 0.02}, com=(0.15, 0, 0), markers={"end": (0.2, 0.05, 0)})
     piston, block = m.body("piston", mass=0.5, inertia={"zz": 0.001}), m.body("block", mass=0.7)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(0.1, 0, 0), rod)
-    m.revolute("C", rod.at(0.3, 0, 0), piston)
-    m.prismatic("S", m.ground, piston, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, piston), 0.1, 0.3, "theta - s", guide="S")
     m.prismatic("L", m.ground, block, axis="y", coordinate="h")
     m.coupling("grip", equation="y(rod.end) - h", closes="y(rod.end) - h")
     m.guess(s=0.35)

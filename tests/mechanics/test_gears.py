@@ -574,17 +574,8 @@ def test_chaplygins_sleigh() -> None:
     assert speed == pytest.approx(np.sqrt(v**2 + (J + mass * a**2) / mass * w**2), rel=1e-5)
 
 
-def rounded_wheel() -> eg.Model:
-    m = eg.Model("ring", gravity=(0, 0, -9.81))
-    wheel = m.body("wheel", mass=1, inertia=(0.05, 0.05, 0.09))
-    m.free("f", m.ground, wheel, sequence="zxz", coordinates=["x", "y", "z", "yaw", "lean", "spin"])
-    m.rolling("roll", wheel, m.ground, radius=0.3, tube=0.05)
-    m.initial(lean=1.2, yaw_dot=0.3, spin_dot=6.0, x=0, y=0, yaw=0, spin=0, lean_dot=0)
-    return m
-
-
 def test_a_rounded_wheel_keeps_its_energy() -> None:
-    mod = rounded_wheel().compile(target="numpy")
+    mod = models.rounded_wheel().compile(target="numpy")
     assert mod.n_dof == 3
     run = mod.simulate((0, 3), rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(run["z"], 0.25 * np.sin(run["lean"]) + 0.05, atol=1e-12)
@@ -694,7 +685,7 @@ def test_the_lowest_point_lies_on_the_plane_and_rests(support: str) -> None:
 @pytest.mark.parametrize(("make", "of"), [
     (cam_model, ("roller", "oscillating")), (cam_model, ("flat_face", "translating")),
     (cam_model, ("knife_edge", "oscillating")), (gearbox, ("ring",)), (gearbox, ("",)), (gearbox, ("ring", "frame")),
-    (rounded_wheel, ()), (sleigh, ()), (partial(ball, no_spin=True), ()),
+    (models.rounded_wheel, ()), (sleigh, ()), (partial(ball, no_spin=True), ()),
 ])  # fmt: skip
 def test_against_multipliers_and_between_methods(make: Any, of: tuple[str, ...]) -> None:
     model = make(*of)

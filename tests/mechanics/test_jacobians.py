@@ -83,18 +83,6 @@ def test_jacobian_of_a_tree_by_recursion() -> None:
 
 
 # -- Of loops by articulated bodies, in C beside the dense system of NumPy ---------------------------------------------
-def rods(twice: bool = False) -> eg.Model:
-    """Two bodies on ball joints in Euler parameters, held together by a rod, or by two in one place."""
-    m = eg.Model("rods", gravity=(0.0, 0.0, -9.81))
-    a = m.body("a", mass=1.2, com=(0.1, 0.2, -0.5), inertia=(0.2, 0.3, 0.15))
-    b = m.body("b", mass=0.8, com=(-0.1, 0.1, -0.4), inertia=(0.1, 0.2, 0.15))
-    m.spherical("A", m.ground, a, rotation="euler_parameters")
-    m.spherical("B", m.ground.at(1.0, 0.0, 0.0), b, rotation="euler_parameters")
-    for name in ("rod", "second") if twice else ("rod",):
-        m.distance(name, a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=1.1)
-    return m
-
-
 def tethered() -> eg.Model:
     """A body that falls freely but for a rod to ground."""
     m = eg.Model("tethered", gravity=(0.3, 0.0, -9.81))
@@ -116,9 +104,9 @@ CASES: dict[str, Callable[[], eg.Model]] = {
     "closed chain": lambda: closed_chain(9, True, False),
     "spatial chain": lambda: closed_chain(9, True, True),
     "four-bars": lambda: four_bars(4),
-    "rods": rods,
+    "rods": models.rods,
     "tethered": tethered,
-    "rods held twice": lambda: rods(True),
+    "rods held twice": lambda: models.rods(True),
     "driven chain": driven,
     "slider-crank": lambda: eg.load(EXAMPLES / "slider_crank.yaml"),
 }

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 import sympy
@@ -131,10 +132,7 @@ def test_one_equation_in_the_crank_angle(method: str, angle: float) -> None:
     m = eg.Model("press", gravity=(0, 0, 0))
     crank, rod = m.body("crank", mass=0, inertia={"zz": CRANK}), m.body("rod", mass=0)
     slider = m.body("slider", mass=SLIDER)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(R, 0, 0), rod, coordinate="phi")
-    m.revolute("C", rod.at(L, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), R, L, "theta phi s")
     m.torque("motor", "A", m.input("tau", 0.7))
     m.guess = {"theta": angle, "phi": -1.2 * angle, "s": 0.6}
     equations = m.derive(method, independent=["theta"])

@@ -133,15 +133,6 @@ def steered() -> eg.Model:
     return m
 
 
-def turning_wheel() -> eg.Model:
-    m = eg.Model("ring", gravity=(0, 0, -9.81))
-    wheel = m.body("wheel", mass=1, inertia=(0.05, 0.05, 0.09))
-    m.free("f", m.ground, wheel, sequence="zxz", coordinates=["x", "y", "z", "yaw", "lean", "spin"])
-    m.rolling("roll", wheel, m.ground, radius=0.3, tube=0.05)
-    m.initial(lean=1.2, yaw_dot=0.3, spin_dot=6.0)
-    return m
-
-
 def shell(rotation: str) -> eg.Model:
     """A ball that rolls on a plane; in it a four-bar whose crank drives a flywheel by a gear."""
     m = eg.Model("shell", gravity=(0.4, -0.3, -9.81))
@@ -165,7 +156,7 @@ def shell(rotation: str) -> eg.Model:
 
 #: Models of which the judge knows all forces, and others: with inputs and outputs, or by builders that stand here.
 JUDGED = [*models.EXAMPLE_NAMES, "offset_slider_crank", "spatial_loop", "skewed_four_bar", "three_cranks",
-          sleigh, turning_wheel]  # fmt: skip
+          sleigh, models.rounded_wheel]  # fmt: skip
 POWERED = ["tilted_four_bar", "powered_arm", "powered_slider_crank", steered]
 KERNELS = ["rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs"]
 

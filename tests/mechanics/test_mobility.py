@@ -65,10 +65,7 @@ def four_bar_and_wheel() -> eg.Model:
     crank = m.body("a", mass=1, com=(0.2, 0, 0), inertia={"zz": 0.1})
     coupler = m.body("b", mass=1, com=(0.55, 0, 0), inertia={"zz": 0.1})
     rocker = m.body("c", mass=1, com=(0.4, 0, 0), inertia={"zz": 0.1})
-    m.revolute("A", m.ground, crank, coordinate="q")
-    m.revolute("B", crank.at(0.4, 0, 0), coupler, coordinate="s")
-    m.revolute("C", coupler.at(1.1, 0, 0), rocker.at(0.8, 0, 0))
-    m.revolute("D", m.ground.at(1.2, 0, 0), rocker, coordinate="r")
+    models.join_four_bar(m, (crank, coupler, rocker), (0.4, 1.1, 0.8, 1.2), "q s r")
     m.revolute("E", m.ground, m.body("w", mass=1, inertia={"zz": 0.3}), coordinate="e")
     m.guess(q=0.6, s=-0.2, r=1.5)
     m.initial(q=0.6)
@@ -88,10 +85,7 @@ def test_rank_needs_no_parameter_values() -> None:
     m = eg.Model("slider_crank", gravity=(0, -9.81, 0))
     r, length = m.parameter("r"), m.parameter("l")
     crank, rod, slider = (m.body(n, mass=1, inertia={"zz": 0.1}) for n in ("crank", "rod", "slider"))
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(r, 0, 0), rod)
-    m.revolute("C", rod.at(length, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), r, length, "theta - s")
     equations = m.derive()
     assert equations.report.assumed
     assert equations.report.degrees_of_freedom == 1

@@ -67,10 +67,7 @@ def crank(F, kind, target="numpy"):
     a = m.body("a", mass=1, com=(r / 2, 0, 0), inertia={"zz": 1e-3})
     b = m.body("b", mass=0.8, com=(l / 2, 0, 0), inertia={"zz": 8e-3})
     s = m.body("s", mass=0.5)
-    m.revolute("A", m.ground, a, coordinate="th")
-    m.revolute("B", a.at(r, 0, 0), b)
-    m.revolute("C", b.at(l, 0, 0), s)
-    m.prismatic("D", m.ground, s, axis="x", coordinate="s")
+    models.join_slider_crank(m, (a, b, s), r, l, "th - s")
     for name in "pq":
         m.revolute(name.upper(), m.ground, m.body(name, mass=1, inertia={"zz": 0.1}))
     if kind == "gear":

@@ -88,17 +88,9 @@ def test_robertson() -> None:
 
 # -- Step by step ------------------------------------------------------------------------------------------------------
 NAMES = (
-    "pendulum",
-    "cart_pendulum",
-    "spherical_pendulum",
-    "slider_crank",
-    "four_bar",
-    "peaucellier",
-    "planetary_gear",
-    "cam_follower",
-    "rolling_disc",
-    "bicycle",
-)
+    "pendulum", "cart_pendulum", "spherical_pendulum", "slider_crank", "four_bar", "peaucellier", "planetary_gear",
+    "cam_follower", "rolling_disc", "bicycle",
+)  # fmt: skip
 TOLERANCES_agreement = {"DOP853": (1e-8, 1e-10), "RK45": (1e-7, 1e-9)}
 END = 2.0
 

@@ -171,10 +171,7 @@ def test_coordinates_called_like_arguments_go_in_a_dict() -> None:
 def parallelogram() -> eg.Model:
     m = eg.Model("parallelogram")
     one, bar, two = (m.body(name, mass=1, inertia={"zz": 1}) for name in ("one", "bar", "two"))
-    m.revolute("A", m.ground, one, coordinate="theta")
-    m.revolute("B", one.at(0.2, 0, 0), bar, coordinate="bend")
-    m.revolute("C", bar.at(0.6, 0, 0), two.at(0.2, 0, 0))
-    m.revolute("D", m.ground.at(0.6, 0, 0), two, coordinate="psi")
+    models.join_four_bar(m, (one, bar, two), (0.2, 0.6, 0.2, 0.6), "theta bend psi")
     m.initial(theta=0.5)
     m.guess(bend=-0.5, psi=0.5)
     return m
@@ -245,10 +242,7 @@ def test_the_second_argument_is_the_time(target: str) -> None:
     m = eg.Model("led")
     r, l = m.parameter("r", 0.1), m.parameter("l", 0.35)
     crank, rod, slider = (m.body(name, mass=1, inertia={"zz": 0.1}) for name in ("crank", "rod", "slider"))
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(r, 0, 0), rod, coordinate="phi")
-    m.revolute("C", rod.at(l, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x")
+    models.join_slider_crank(m, (crank, rod, slider), r, l, "theta phi -")
     m.driver("motor", "theta", 0.2 + 3 * m.t)
     m.initial(theta=0.2)
     m.guess(D=0.45, phi=-0.3)

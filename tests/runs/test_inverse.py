@@ -3,6 +3,7 @@
 from typing import Any
 
 import judges
+import models
 import numpy as np
 import pytest
 import scipy.linalg
@@ -97,10 +98,7 @@ def test_drive_on_a_cut_joint_equals_a_torque_there() -> None:
     def build(torque: float | None) -> Any:
         m = eg.Model("driven_bar", gravity=(0, -9.81, 0))
         bar = [m.body(n, mass=1.0 + i, com=(0.2, 0, 0), inertia={"zz": 0.02}) for i, n in enumerate("abc")]
-        m.revolute("A", m.ground, bar[0], coordinate="qA")
-        m.revolute("B", bar[0].at(0.3, 0, 0), bar[1], coordinate="qB")
-        m.revolute("C", bar[1].at(0.6, 0, 0), bar[2].at(0.5, 0, 0))
-        m.revolute("D", m.ground.at(0.7, 0, 0), bar[2], coordinate="qD")
+        models.join_four_bar(m, (bar[0], bar[1], bar[2]), (0.3, 0.6, 0.5, 0.7), "qA qB qD")
         if torque is not None:
             m.torque("motor", "C", torque)
         m.initial(qA=1.0, qA_dot=2.0)

@@ -18,10 +18,7 @@ import eomgen as eg
 def parallelogram(value: str = "0.5 + 2*pi*t") -> eg.Model:
     m = eg.Model("parallelogram")
     one, bar, two = (m.body(name, mass=0) for name in ("one", "bar", "two"))
-    m.revolute("A", m.ground, one, coordinate="theta")
-    m.revolute("B", one.at(0.2, 0, 0), bar, coordinate="bend")
-    m.revolute("C", bar.at(0.6, 0, 0), two.at(0.2, 0, 0))
-    m.revolute("D", m.ground.at(0.6, 0, 0), two, coordinate="psi")
+    models.join_four_bar(m, (one, bar, two), (0.2, 0.6, 0.2, 0.6), "theta bend psi")
     m.output("ax", "ax(bar)")
     m.driver("drive", "theta", value)
     m.guess(bend=-0.5, psi=0.5)
@@ -38,10 +35,7 @@ def free_crank() -> eg.Module:
     """The same with masses and without its driver."""
     m = eg.Model("free_slider_crank")
     one, rod, slider = (m.body(name, mass=1, inertia={"zz": 1}) for name in ("crank", "rod", "slider"))
-    m.revolute("A", m.ground, one, coordinate="theta")
-    m.revolute("B", one.at(0.1, 0, 0), rod, coordinate="bend")
-    m.revolute("C", rod.at(0.3, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (one, rod, slider), 0.1, 0.3, "theta bend s")
     m.guess(bend=0, s=0.4)
     return m.compile(target="numpy", independent=["theta"])
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 from models import IN_C
@@ -631,10 +632,7 @@ def four_bar(kind: str) -> eg.Module:
     crank = m.body("crank", mass=1.0, com=(0.1, 0, 0), inertia={"zz": 0.01})
     coupler = m.body("coupler", mass=2.0, com=(0.25, 0.05, 0), inertia={"zz": 0.05})
     rocker = m.body("rocker", mass=1.5, com=(0.2, 0, 0), inertia={"zz": 0.03})
-    m.revolute("A", m.ground, crank, coordinate="a")
-    m.revolute("B", crank.at(0.2, 0, 0), coupler, coordinate="b")
-    m.revolute("C", coupler.at(0.5, 0, 0), rocker.at(0.4, 0, 0))
-    m.revolute("D", m.ground.at(0.45, 0, 0), rocker, coordinate="d")
+    models.join_four_bar(m, (crank, coupler, rocker), (0.2, 0.5, 0.4, 0.45), "a b d")
     m.initial(a=0.3), m.guess(b=0.4, d=1.25)
     ball = coupler.marker("ball", at=(0.25, -0.1, 0))
     if kind == "event":

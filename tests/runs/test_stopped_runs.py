@@ -9,6 +9,7 @@ from functools import cache
 from itertools import product
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 from analysed import compiled
@@ -131,10 +132,7 @@ def four_bar() -> eg.Model:
         m.parameter(name, value)
     m.input("tau")
     a, b, c = (m.body(name, mass="sqrt(w)", inertia={"zz": "0.001*sqrt(w)"}) for name in ("crank", "coupler", "rocker"))
-    m.revolute("A", m.ground, a, coordinate="theta")
-    m.revolute("B", a.at(0.04, 0, 0), b, coordinate="bend")
-    m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
-    m.revolute("D", m.ground.at(0.1, 0, 0), c, coordinate="psi")
+    models.join_four_bar(m, (a, b, c), (0.04, 0.12, 0.08, 0.1), "theta bend psi")
     m.torque("motor", "A", "tau")
     m.torque("law", "D", "-sqrt(k + psi)")
     m.guess(theta=1.0, bend=-0.7, psi=1.1)

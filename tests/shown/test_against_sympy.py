@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 import sympy as sp
@@ -139,10 +140,7 @@ def slider_crank() -> tuple[Any, Any, list[Any], list[Any]]:
     crank = m.body("crank", mass="m_c", com=("r", 0, 0))
     rod = m.body("rod", mass="m_r", com=("l/2", 0, 0), inertia={"zz": "m_r*l**2/12"})
     slider = m.body("slider", mass="m_s")
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at("r", 0, 0), rod, coordinate="beta")
-    m.revolute("C", rod.at("l", 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), "r", "l", "theta beta s")
     m.torque("motor", "A", "tau")
     m.independent("theta")
     m.initial(theta=0.3)

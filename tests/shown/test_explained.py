@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import models
 import numpy as np
 import pytest
 import sympy as sp
@@ -289,10 +290,7 @@ def test_accelerations_of_a_published_slider_crank() -> None:
     crank = m.body("crank", mass="m1", com=("l1/2", 0, 0), inertia={"zz": "J1"})
     rod = m.body("rod", mass="m2", com=("l2/2", 0, 0), inertia={"zz": "J2"})
     slider = m.body("slider", mass="m3")
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at("l1", 0, 0), rod, coordinate="bend")
-    m.revolute("C", rod.at("l2", 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), "l1", "l2", "theta bend s")
     m.initial(theta=0.0, theta_dot=150.0)
     found = lines(section(m.derive(independent=["theta"]).explain(), "Numbers"))
     crank_turn, rod_turn, along = map(float, known["reference"]["omega150"]["initial_acc"])
@@ -413,10 +411,7 @@ def test_multipliers_are_not_parameters() -> None:
         m.parameter(name, value)
     crank, rod = m.body("crank", mass="lambda_1", com=(0.1, 0, 0)), m.body("rod", mass="M*c12", com=(0.2, 0, 0))
     slider = m.body("slider", mass=1)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(0.1, 0, 0), rod, coordinate="beta")
-    m.revolute("C", rod.at(0.4, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), 0.1, 0.4, "theta beta s")
     m.actuator("pull", "D", "-A_F_x*s_dot")
     m.independent("theta")
     m.initial(theta=0.3)

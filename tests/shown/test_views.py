@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
+import models
 import numpy as np
 import pytest
 import sympy as sp
@@ -98,10 +99,7 @@ def test_what_a_method_does_not_have_is_refused_by_name(method: str) -> None:
 def test_a_tree_whose_mass_matrix_has_no_inverse_has_no_hamiltonian() -> None:
     m = eg.Model("loop", gravity=(0, -9.81, 0))
     crank, rod, slider = m.body("crank", mass=1, inertia={"zz": 1}), m.body("rod", mass=0), m.body("slider", mass=0)
-    m.revolute("A", m.ground, crank, coordinate="theta")
-    m.revolute("B", crank.at(0.2, 0, 0), rod, coordinate="phi")
-    m.revolute("C", rod.at(0.5, 0, 0), slider)
-    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    models.join_slider_crank(m, (crank, rod, slider), 0.2, 0.5, "theta phi s")
     m.guess(s=0.6)
     m.initial(theta=0.4)
     refuses("EG-UNAVAILABLE inverse", lambda: m.derive("hamilton", independent=["theta"]).hamiltonian)
