@@ -27,14 +27,12 @@ from .polygons import PolygonPolygon
 from .profiles import WALLS, ArcRound, EdgeRound, HollowArcRound, InnerCornerRound, InsideRound, ProfilePiece
 from .rounds import (
     AtHeight,
-    BlockRound,
+    CoreRound,
     EdgeEdge,
     EdgeRod,
     PolygonRound,
     RodCorner,
     RodRod,
-    RoundRound,
-    SegmentRound,
     SharedEnergy,
 )
 from .shapes import SHAPES, WHOLE_PLATE, greatest
@@ -69,17 +67,14 @@ def _each(first: str, second: Sequence[str], make: Make) -> dict[tuple[str, str]
     return {(first, one): make for one in second}
 
 
-def _on_segment(g: Given) -> Contact:
-    return SegmentRound(*g.laws, g.first[0], (g.first[1], g.radius))
+def _on_core(g: Given) -> Contact:
+    """On a core with half lengths and a radius as sizes."""
+    *halves, radius = g.first
+    return CoreRound(*g.laws, tuple(halves), (radius, g.radius))
 
 
 def _two_rods(g: Given) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]]:
     return (g.first[0], g.second[0]), (g.first[1], g.second[1])
-
-
-def _on_block(g: Given) -> Contact:
-    x, y, z, edge = g.first
-    return BlockRound(*g.laws, (x, y, z), edge, g.radius)
 
 
 def _on(kind: type[ProfilePiece]) -> Make:
@@ -104,17 +99,17 @@ _THIN, _POINTS = ("segment", "edge", "arc", "rod", CORE), ("vertex", "pad", "rou
 _OUTLINED = ("round", "corner", "vertex", "pad")
 #: Features that meet -> their contact.  The first is a surface, or both are of one class.
 MEETINGS: dict[tuple[str, str], Make] = {
-    ("round", "round"): lambda g: RoundRound(*g.laws, (g.first[0], g.radius)),
+    ("round", "round"): _on_core,
     ("rod", "rod"): lambda g: RodRod(*g.laws, *_two_rods(g)),
-    ("rod", "round"): _on_segment,
-    ("rod", "rounded_corner"): lambda g: RodCorner(*g.laws, g.first[0], (g.first[1], g.radius), g.second[1:]),
-    **_each("segment", ("round", "corner", "vertex"), _on_segment),
+    ("rod", "round"): _on_core,
+    ("rod", "rounded_corner"): lambda g: RodCorner(*g.laws, g.first[:1], (g.first[1], g.radius), g.second[1:]),
+    **_each("segment", ("round", "corner", "vertex"), _on_core),
     ("ellipsoid", "round"): lambda g: EllipsoidRound(*g.laws, g.first, g.radius),
     ("ellipsoid", "rod"): lambda g: EllipsoidRod(*g.laws, g.first, g.second[1], g.radius),
     ("ellipsoid", "ellipsoid"): lambda g: EllipsoidEllipsoid(*g.laws, (g.first, g.second)),
-    (BLOCK, "round"): _on_block,
+    (BLOCK, "round"): _on_core,
     (BLOCK, "ellipsoid"): lambda g: BlockEllipsoid(*g.laws, g.first[:3], g.second),
-    **_each(CORE, ("rounded_corner", "tip"), _on_block),
+    **_each(CORE, ("rounded_corner", "tip"), _on_core),
     ("rounded_edge", "rounded_edge"): lambda g: EdgeEdge(*g.laws, *_two_rods(g)),
     ("rounded_edge", "axis"): lambda g: EdgeRod(*g.laws, *_two_rods(g), g.first[2:]),
     **_each(FIELD, ("round", "end"), lambda g: FieldRound(*g.laws, g.field, g.radius)),

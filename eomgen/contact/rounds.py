@@ -17,7 +17,7 @@ from ..expr.differentiate import gradient
 from ..expr.vectors import Mat3, Vec3
 from .limits import PARALLEL
 from .pair_features import EDGE
-from .point import Contact, SphereSphere, Touch
+from .point import Contact, Touch
 from .states import BLOCK, CORE
 
 # -- circles and spheres -----------------------------------------------------------------------------------------------
@@ -54,35 +54,51 @@ def settled(view: View, x: Expr) -> Expr:
     return x if keep is None else keep(x)
 
 
-class RoundRound(SphereSphere):
-    """Two circles or spheres; where their centres coincide the second is pushed along x of the first marker."""
+class CoreRound(Contact):
+    """A circle or sphere about the second marker on a core about the first, both with a radius around them.
 
-    def touch(self, view: View) -> Touch:
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        normal, distance = direction(reach, vec.transpose(view.rotation(self.first))[0])
-        depth = self.radii[0] + self.radii[1] - distance
-        first = vec.scale(self.radii[0] - 0.5 * depth, normal)
-        return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
-
-
-class SegmentRound(Contact):
-    """A circle or sphere about the second marker on a segment along x of the first, which has a radius of its own.
-
-    A centre on the segment is pushed along y of the first marker.
+    The core is a point, a segment along x or a cuboid, by none, one or three half lengths along x, y, z.  A centre
+    outside is pushed away from the nearest point of the core, one inside a cuboid out through the nearest face, one on
+    a segment along y, one at a point along x.
     """
 
-    half: Expr
+    halves: tuple[Expr, ...]
     radii: tuple[Expr, Expr]
 
     def touch(self, view: View) -> Touch:
-        graph, along = view.graph, vec.transpose(view.rotation(self.first))[0]
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        place = graph.apply("max", -self.half, graph.apply("min", self.half, vec.dot(along, reach)))
-        across = vec.sub(reach, vec.scale(place, along))
-        normal, distance = direction(across, vec.transpose(view.rotation(self.first))[1])
-        depth = self.radii[0] + self.radii[1] - distance
-        first = vec.add(vec.scale(place, along), vec.scale(self.radii[0] - 0.5 * depth, normal))
-        return normal, depth, first, vec.scale(0.5 * depth - self.radii[1], normal)
+        reach, R, place = seen_from(self, view)
+        if len(self.halves) == 3:
+            normal, gap = self._beside_cuboid(place)
+            normal = vec.times(R, normal)
+        else:
+            axes, across = vec.transpose(R), reach
+            for half, along, x in zip(self.halves, axes, place, strict=False):
+                across = vec.sub(across, vec.scale(_within(x, half), along))
+            normal, gap = direction(across, axes[len(self.halves)])
+        depth = self.radii[0] + self.radii[1] - gap
+        second = vec.scale(0.5 * depth - self.radii[1], normal)
+        return normal, depth, vec.add(reach, second), second
+
+    def _beside_cuboid(self, place: Vec3) -> tuple[Vec3, Expr]:
+        """The normal in the cuboid's axes and the gap."""
+        graph = place[0].graph
+        x, y, z = (a - _within(a, h) for a, h in zip(place, self.halves, strict=True))
+        beyond = [graph.apply("max", a, -a) - h for a, h in zip(place, self.halves, strict=True)]
+        face: Vec3 = (graph.one, graph.zero, graph.zero)
+        rise = beyond[0]
+        for k in (1, 2):
+            higher = graph.apply("lt", rise, beyond[k])
+            rise = where(higher, beyond[k], rise)
+            a, b, c = (where(higher, 1.0 if k == n else 0.0, face[n]) for n in range(3))
+            face = (a, b, c)
+        a, b, c = (where(graph.apply("lt", p, 0.0), -n, n) for p, n in zip(place, face, strict=True))
+        normal, distance = direction((x, y, z), (a, b, c))
+        return normal, where(graph.apply("lt", 0.0, distance), distance, rise)
+
+
+def _within(x: Expr, half: Expr) -> Expr:
+    """A place between -half and half that is nearest to x."""
+    return x.graph.apply("max", -half, x.graph.apply("min", half, x))
 
 
 class PolygonRound(Contact):
@@ -183,16 +199,13 @@ class RodRod(Contact):
         a, b = (vec.transpose(view.rotation(marker))[0] for marker in (self.first, self.second))
         reach = vec.sub(view.position(self.second), view.position(self.first))
 
-        def within(x: Expr, half: Expr) -> Expr:
-            return graph.apply("max", -half, graph.apply("min", half, x))
-
         e, c, f = vec.dot(a, b), vec.dot(a, reach), vec.dot(b, reach)
         cross = vec.cross(a, b)
         square = vec.dot(cross, cross)
         skew = graph.apply("lt", PARALLEL, square)
         s = where(skew, (c - e * f) / where(skew, square, 1.0), 0.0)
-        t = within(e * within(s, self.halves[0]) - f, self.halves[1])
-        s = within(c + e * t, self.halves[0])
+        t = _within(e * _within(s, self.halves[0]) - f, self.halves[1])
+        s = _within(c + e * t, self.halves[0])
         return a, b, s, t, vec.add(reach, vec.sub(vec.scale(t, b), vec.scale(s, a)))
 
 
@@ -262,9 +275,9 @@ def beside_ends(
 ) -> Expr:
     """The part of the law of a rod's middle at depth d that counts beside its ends, which touch the solid themselves.
 
-    With the depth e of the deeper end in the cuboid, given by the place of a marker from its centre and half lengths,
-    it is 1 - (e / d)^2, not below 0: with that of the end the energy is the law's at the end and far from it, and
-    nowhere more than that of the deeper, of laws that are linear or stiffen.
+    It is the product of 1 - (e / d)^2, not below 0, of both ends, with their depths e in the cuboid, given by the place
+    of a marker from its centre and half lengths: with that of an end the energy is the law's at the end and far from
+    it, and nowhere more than that of the deeper, of laws that are linear or stiffen.  Each end that touches counts.
     """
     graph, (marker, half), (other, centre, halves) = view.graph, rod, solid
     larger = partial(graph.apply, "max")
@@ -279,10 +292,12 @@ def beside_ends(
         apart = graph.apply("lt", 0.0, square)
         return where(apart, sqrt(where(apart, square, 1.0)), reduce(larger, out))
 
-    deeper = where(graph.apply("lt", gap(half), gap(-half)), half, -half)  # so that one end has derivatives
+    def beside(end: Expr) -> Expr:
+        part = graph.apply("min", 1.0, larger(0.0, radius - gap(end)) / where(deep, depth, 1.0))
+        return 1.0 - part * part
+
     deep = graph.apply("lt", 0.0, depth)
-    part = graph.apply("min", 1.0, larger(0.0, radius - gap(deeper)) / where(deep, depth, 1.0))
-    return where(deep, 1.0 - part * part, 1.0)
+    return where(deep, beside(half) * beside(-half), 1.0)
 
 
 class EdgeEdge(SharedEnergy, RodRod):
@@ -317,7 +332,7 @@ class EdgeRod(EdgeEdge):
         return self._share(view, 1) * beside
 
 
-class RodCorner(SharedEnergy, SegmentRound):
+class RodCorner(SharedEnergy, CoreRound):
     """A corner of a cuboid on a rod, whose ends touch the cuboid by themselves."""
 
     corner: Vec3  #: from the cuboid's centre
@@ -325,38 +340,4 @@ class RodCorner(SharedEnergy, SegmentRound):
     def share(self, view: View) -> Expr:
         x, y, z = (view.graph.apply("max", k, -k) for k in self.corner)
         solid, radius = (self.second, self.corner, (x, y, z)), self.radii[0] + self.radii[1]
-        return beside_ends(view, (self.first, self.half), solid, self.touch(view)[1], radius)
-
-
-class BlockRound(Contact):
-    """A sphere about the second marker on a cuboid about the first, half lengths along its x, y, z.
-
-    A centre outside is pushed away from the nearest point of the cuboid, one inside out through the nearest face.
-    ``rounding`` is the radius of a layer around it.
-    """
-
-    halves: tuple[Expr, Expr, Expr]
-    rounding: Expr
-    radius: Expr
-
-    def touch(self, view: View) -> Touch:
-        graph = view.graph
-        reach, R, place = seen_from(self, view)
-        x, y, z = (
-            a - graph.apply("max", -h, graph.apply("min", h, a)) for a, h in zip(place, self.halves, strict=True)
-        )
-        beyond = [graph.apply("max", a, -a) - h for a, h in zip(place, self.halves, strict=True)]
-        face: Vec3 = (graph.one, graph.zero, graph.zero)
-        rise = beyond[0]
-        for k in (1, 2):
-            higher = graph.apply("lt", rise, beyond[k])
-            rise = where(higher, beyond[k], rise)
-            a, b, c = (where(higher, 1.0 if k == n else 0.0, face[n]) for n in range(3))
-            face = (a, b, c)
-        a, b, c = (where(graph.apply("lt", p, 0.0), -n, n) for p, n in zip(place, face, strict=True))
-        normal, distance = direction((x, y, z), (a, b, c))
-        gap = where(graph.apply("lt", 0.0, distance), distance, rise)
-        out = vec.times(R, normal)
-        depth = self.rounding + self.radius - gap
-        second = vec.scale(0.5 * depth - self.radius, out)
-        return out, depth, vec.add(reach, second), second
+        return beside_ends(view, (self.first, self.halves[0]), solid, self.touch(view)[1], radius)

@@ -275,6 +275,25 @@ def test_flat_ellipsoids_lie_deep(second: dict[str, Any], most: float) -> None:
         assert np.isfinite(mod.rhs(0.0, x)).all()
 
 
+def test_both_ends_of_a_capsule_across_an_edge() -> None:
+    """Two ends and the edge between them touch: each end has the law's energy, forces change continuously there."""
+    m, (a, b) = flying(2)
+    edge, half, rise = 0.02, 0.025, 0.04
+    m.contacts("touch", {**BLOCK, "edge_radius": edge, "on": a}, {**ROD, "length": 2 * half, "on": b}, ELASTIC)
+    mod = m.compile(target="numpy")
+    out, across = np.array([1, 0, 1]) / np.sqrt(2), np.array([1, 0, -1]) / np.sqrt(2)
+    place = (np.array(BLOCK["size"]) / 2 - edge) * (1, 0, 1) + rise * out
+    turn = Rotation.align_vectors([across], [(0, 0, 1)])[0]
+    sides = [Rotation.from_rotvec((0, way, 0)) * turn for way in (-1e-7, 1e-7)]
+    before, after = (-mod.bias(0.0, state(mod, [(0, 0, 0), place], [Rotation.identity(), side])) for side in sides)
+    assert np.abs(after - before).max() < 1e-4 * np.abs(before).max()
+    deep, end = edge + 0.05 - rise, edge + 0.05 - np.hypot(rise, half)
+    wanted = (2 * end**2.5 + (1 - (end / deep) ** 2) ** 2 * deep**2.5) * STIFF / 2.5
+    x = state(mod, [(0, 0, 0), place], [Rotation.identity(), turn])
+    assert mod.energy(x)[1] == pytest.approx(wanted, rel=1e-9)
+    check_slopes(mod, x)
+
+
 @pytest.mark.parametrize("part", [0.02, 0.5, 0.95])
 def test_a_corner_along_a_capsule(part: float) -> None:
     """From its middle over its end the energy is continuous, that of one law at both, and never more."""
