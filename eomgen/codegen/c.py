@@ -10,7 +10,7 @@ from typing import Any
 
 from ..base.kernel_table import KERNELS
 from ..expr.texts import comment_lines
-from ..toolchain.layer import SOLVER, SOLVER_HEADERS, read_header, read_layer
+from ..toolchain.layer import PAIRS_HEADER, SOLVER, SOLVER_HEADERS, read_header, read_layer
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels, series_files
 from .c_layout import describe_equations, is_straight, work_areas
@@ -19,7 +19,7 @@ from .c_rolled import print_block_of_branches, print_rolled
 from .c_text import Printed, print_block, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
 from .loop_systems import LARGE
-from .pair_sums import contact_tables
+from .pair_sums import contact_tables, used_sums
 from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 from .series import NoSeriesError
 from .standalone_c import in_single_precision, operations_of, refuse_double, stack_of, states_beside_change_points
@@ -88,7 +88,7 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     }
     if program.drivers:
         sources |= {name: read_header(name) for name in SOLVER_HEADERS} | {SOLVER: read_layer()[SOLVER]}
-    sources |= {name: read_header(name) for name in HEADERS}
+    sources |= {name: read_header(name) for name in (*HEADERS, *([PAIRS_HEADER] if used_sums(program) else []))}
     if precision:
         context |= {"costs": _costs(program, sources), "most_states": states_beside_change_points()}
     sources |= {f"{name}.h": render("c/model.h.j2", context), "model.json": metadata_json(program)}

@@ -6,24 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ..base.kernel_table import RECORD, WITNESS
+from ..base.kernel_table import WITNESS
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
-from ..contact.pair_features import CHOSEN, OTHER, OWN, PIECE
-from ..contact.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, RESULT, SORTED
+from ..contact.pair_features import CHOSEN, OTHER, OWN
+from ..contact.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, SORTED
 from ..contact.pairs import PairFunction, PairKind, PairPart
-from ..expr.core import Expr, symbols_of
+from ..expr.core import Expr
 from .c_functions import plain_declarations
 from .c_text import print_pieces, used_helpers
 from .files import render
 from .pair_sums import (
-    STATE_RECORD,
     SumAgain,
     UsedSum,
     has_columns,
     placed_length,
     plain_numbers,
-    record_of,
-    room_of_states,
     slots_of,
     sums_again,
     used_sums,
@@ -95,6 +92,12 @@ def written(table: Sequence[Sequence[int]]) -> dict[str, list[Row]]:
     }
 
 
+#: Limits by their names in C, where they stand behind ``PAIRS_``.
+_LIMITS = {
+    "APART": APART, "NEAR": NEAR, "OUTSIDE": OUTSIDE, "UP_TO": UP_TO, "BEYOND": BEYOND, "WITHIN": WITHIN,
+    "NEVER": NEVER,
+}  # fmt: skip
+_ENDINGS = {"outputs": "", "slopes": "_slope", "touch": "_touch", "witness": "_witness"}  #: of names of laws
 RATES = 6  #: results of a body: force and torque
 SINGLED = 8  #: bodies of which no result is read, up to which the text names them
 
@@ -125,114 +128,133 @@ def pair_files(program: Program) -> dict[str, str]:
 
 def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
     """The file of a sum, with derivatives along one direction after another if they are taken."""
-    function = used.function
-    parts: list[tuple[PairPart, str]] = [("outputs", "")] if used.sums or used.slopes else []
-    parts += [("slopes", "_slope")] if used.slopes else []
-    parts += [("touch", "_touch")] if used.meets else []
-    parts += [("witness", "_witness")] if used.lists else []
+    function, prefix = used.function, f"{program.name}_pairs_{used.function.name}"
+    wanted: dict[PairPart, bool] = {
+        "outputs": used.sums or used.slopes, "slopes": used.slopes, "touch": used.meets, "witness": used.lists,
+    }  # fmt: skip
     tables = _tables(function)
     for k in {kind.first for kind in function.kinds if kind.lines}:
         tables[k]["lined"] = True
+    laws: list[str] = []
     functions: list[str] = []
     helpers: list[str] = []
     kinds: list[dict[str, Any]] = []
     for kind in function.kinds:
-        named = f"{function.name}_{kind.name}"
-        for part, ending in parts:
-            name = f"{named}{ending}"
-            ending = ("", "_chosen", "_facing")[len(kind.corners)]
-            text, needed = _law(program, kind, f"{name}{ending}", part, tables)
+        numbers = dict.fromkeys(wanted, 0)  # of laws, from 1 on
+        for part in [part for part, needed in wanted.items() if needed]:
+            laws.append(f"{function.name}_{kind.name}{_ENDINGS[part]}")
+            numbers[part] = len(laws)
+            text, more = _law(program, kind, laws[-1], part, tables)
             functions.append(text)
-            if kind.corners:
-                functions.append(_choosing(kind, name, part, tables))
-            helpers += [helper for helper in needed if helper not in helpers]
-        touch = kind.expressions("touch")
+            helpers += [helper for helper in more if helper not in helpers]
+        turns, places = not kind.expressions("touch")[-1].is_zero, len(kind.witness) // WITNESS
+        is_sorted = int(_is_sorted(function, kind))
         kinds.append(
             {
                 "n": len(kinds),
                 "name": kind.name,
-                "sorted": _is_sorted(function, kind),
-                "turns": not touch[-1].is_zero,
-                "shaped": any(name.startswith("l") for name in symbols_of(touch)),  # by numbers behind the bodies
-                "function": named,
-                "first": tables[kind.first],
-                "second": tables[kind.second],
-                "planar": kind.extent,
-                "thin": kind.thin,
+                "first": kind.first,
+                "second": kind.second,
+                "counts": (kind.extent, kind.thin, is_sorted, int(turns), places, kind.states, len(kind.law)),
+                "corners": (*kind.corners, 0, 0)[:2],
                 "lines": kind.lines,
                 "law": kind.law,
-                "states": kind.states,
-                "pieces": kind.corners[0] if len(kind.corners) == 1 else 0,
-                "places": len(kind.witness) // WITNESS,
-                "held": [written([(at,) for at in places]) for places in kind.held],
+                "held": [written([(at,) for at in places]) | {"columns": 1} for places in kind.held],
+                "laws": numbers.values(),
             }
         )
     calls = {op: call for kind in function.kinds for op, call in kind.calls}
-    context = used._asdict() | {
+    sorted_counts = [tables[kind["second"]]["count"] for kind in kinds if kind["counts"][2]]
+    counts = {
+        "BODIES": function.bodies,
+        "RESULTS": function.results,
+        "FIRST_STATE": function.first_state,
+        "GIVEN": function.count,
+        "ALL_TABLES": len(tables),
+        "ALL_KINDS": len(kinds),
+        "ALL_SHAPES": sum(map(len, function.tables)),
+        "SHAPES": sum(table["count"] * table["length"] for table in tables),
+        "WIDEST": max(table["columns"] for table in tables),
+        "LONGEST": max(table["length"] for table in tables),
+        "LAWS": max(len(kind.law) + kind.states for kind in function.kinds),
+        "STATED": max(kind.states for kind in function.kinds),
+        "CORNERS": max((max(kind.corners) for kind in function.kinds if len(kind.corners) == 2), default=1),
+        "MOST": max(sorted_counts, default=1),
+        "ROOM": function.room,
+        "SLOPES": int(used.slopes),
+        "LISTS": int(used.lists),
+        "MEETS": int(used.meets),
+        "HELD": int(has_columns(program, function)),
+        "LINED": int(any(table["lined"] for table in tables)),
+        "OUTLINES": int(any(len(kind.corners) == 1 for kind in function.kinds)),
+        "POLYGONS": int(any(len(kind.corners) == 2 for kind in function.kinds)),
+    }
+    context = {
         "name": program.name,
         "sum": function.name,
-        "prefix": f"{program.name}_pairs_{function.name}",
-        "bodies": function.bodies,
-        "pose": POSE,
-        "pair": RESULT,
-        "place": PLACE,
-        "results": function.results,
-        "states": function.states,
-        "first_state": function.first_state,
+        "prefix": prefix,
+        "limits": {name: repr(x) for name, x in _LIMITS.items()},
+        "counts": counts | (_columns(again) if again is not None else {}),
+        "again": again,
+        **(_patterns(again) if again is not None else {}),
         "numbers": [repr(x) for x in plain_numbers(function)] or ["0.0"],
+        "called": plain_declarations(program.name, calls.values()),
+        "helpers": helpers,
+        "functions": functions,
+        "laws": laws,
         "tables": tables,
         "kinds": kinds,
-        "functions": functions,
-        "polygons": max((max(kind.corners) for kind in function.kinds if len(kind.corners) == 2), default=0),
-        "outlines": any(len(kind.corners) == 1 for kind in function.kinds),
-        "piece": PIECE,
-        "chosen": CHOSEN,
-        "own": OWN,
-        "other": OTHER,
-        "helpers": helpers,
-        "called": plain_declarations(program.name, calls.values()),
-        "moving": len(function.data) - function.states,
-        "most": max((kind["second"]["count"] for kind in kinds if kind["sorted"]), default=0),
-        "lined": any(table["lined"] for table in tables),
-        "longest": max(table["length"] for table in tables),
-        "apart": repr(APART),
-        "witness": WITNESS,
-        "record": RECORD,
-        "room": function.room,
-        "near": repr(NEAR),
-        "outside": repr(OUTSIDE),
-        "turns": any(kind["turns"] for kind in kinds),
-        "never": repr(NEVER),
-        "meeting": MEETING,
-        "beyond": repr(BEYOND),
-        "up_to": repr(UP_TO),
-        "within": repr(WITHIN),
-        "again": again is not None,
-        "held": has_columns(program, function),
-        "held_record": STATE_RECORD,
-        "room_of_states": room_of_states(function),
-        **(_columns(again) if again is not None else {}),
-        "kept": record_of(function),
-        "slots": slots_of(function),
-        "given": function.count,
-        "shapes": sum(map(len, function.tables)),
-        "scratch": sum(table["count"] * table["length"] for table in tables),
+        "parts": [
+            (_prototype(f"{prefix}_{part}", arguments), f"pairs_{part}({', '.join(arguments)})")
+            for part, arguments in _parts(program, used, again is not None).items()
+        ],
     }
     return render("c/pairs.c.j2", context)
 
 
-def _columns(again: SumAgain) -> dict[str, Any]:
-    """Which numbers have rates and which results are read, as patterns that all bodies share."""
-    function = again.function
+def _columns(again: SumAgain) -> dict[str, int]:
+    """Sizes of the columns of a derivative."""
+    function, patterns = again.function, _patterns(again)
     poses, forces = POSE * function.bodies, RATES * function.bodies
-    unread = set(range(function.bodies)).difference(k // RATES for k in again.read if k < forces)
+    return {
+        "SLOTS": slots_of(function),
+        "RATED": len(patterns["rated"]),
+        "FURTHER": len(function.data) if any(k >= poses for k in again.rated) else 0,
+        "READ": len(patterns["components"]),
+        "NOT_READ": len(patterns["unread"]),
+        "BEHIND": forces if forces in again.read else forces + 1,
+    }
+
+
+def _patterns(again: SumAgain) -> dict[str, list[int]]:
+    """Which numbers have rates and which results are read, as patterns that all bodies share."""
+    poses, forces = POSE * again.function.bodies, RATES * again.function.bodies
+    unread = set(range(again.function.bodies)).difference(k // RATES for k in again.read if k < forces)
     return {
         "rated": sorted({k % POSE for k in again.rated if k < poses}),
-        "further": len(function.data) if any(k >= poses for k in again.rated) else 0,
         "components": sorted({k % RATES for k in again.read if k < forces}),
         "unread": sorted(unread) if len(unread) <= SINGLED else [],
-        "behind": forces if forces in again.read else forces + 1,
     }
+
+
+def _parts(program: Program, used: UsedSum, again: bool) -> dict[str, tuple[str, ...]]:
+    """What of a sum is called, and the names of the arguments, all numbers."""
+    wanted: dict[str, tuple[Any, tuple[str, ...]]] = {
+        "sum": (used.sums, ("given", "out", "work")),
+        "witnesses": (used.lists, ("given", "out", "work")),
+        "meeting": (used.meets, ("given", "accelerations", "out", "work")),
+        "slope": (used.slopes, ("given", "rates", "out", "work")),
+        "held": (has_columns(program, used.function), ("given", "out", "work")),
+        "again": (again, ("given", "rates", "out", "met", "kept")),
+    }
+    return {part: arguments for part, (needed, arguments) in wanted.items() if needed}
+
+
+def _prototype(function: str, arguments: Sequence[str]) -> str:
+    """Declaration of such a function."""
+    read = ("given", "rates", "accelerations")
+    typed = [f"{'const ' if name in read else ''}double *{name}" for name in arguments]
+    return f"void {function}({', '.join(typed)})"
 
 
 def _is_sorted(function: PairFunction, kind: PairKind) -> bool:
@@ -272,45 +294,28 @@ def _law(
     return print_pieces(inner, name, pieces, places).text, used_helpers(inner, [*outputs, *guards])
 
 
-def _choosing(kind: PairKind, name: str, part: PairPart, tables: Sequence[dict[str, Any]]) -> str:
-    """The function of two polygons or the inside of an outline, which calls that of the numbers that matter."""
-    first, second = tables[kind.first], tables[kind.second]
-    context = {"name": name, "first": first["length"], "second": second["length"], "corners": kind.corners}
-    return render("c/pairs_chosen.c.j2", {**context, "own": OWN, "other": OTHER, "sloped": part == "slopes"})
-
-
 def pair_declarations(program: Program) -> list[str]:
     """Declarations of the sums, in every lane, for the files that call them."""
     again = {one.function.name for one in sums_again(program)}
-    return [
-        _declared(program.name, used, used.function.name in again, has_columns(program, used.function))
-        for used in used_sums(program)
-    ]
+    return [_declared(program, used, used.function.name in again) for used in used_sums(program)]
 
 
-def _declared(program: str, used: UsedSum, again: bool, held: bool) -> str:
+def _declared(program: Program, used: UsedSum, again: bool) -> str:
     function = used.function
-    prefix, n, results = f"{program}_pairs_{function.name}", function.count, function.results
+    prefix, n, results = f"{program.name}_pairs_{function.name}", function.count, function.results
     text = f"#define pairs_{function.name}_numbers {prefix}_numbers\n"
     text += f"EOMGEN_PIECE extern const double {prefix}_numbers[{max(1, len(plain_numbers(function)))}];\n"
-    parts = {
-        "sum": (used.sums, "", (n, 0, results)),
-        "witnesses": (used.lists, "", (n, 0, function.witnesses)),
-        "meeting": (used.meets, "const double *accelerations, ", (n, MOTION * function.bodies, MEETING)),
-        "slope": (used.slopes, "const double *rates, ", (n, n, results)),
+    sizes = {
+        "sum": (n, 0, results),
+        "witnesses": (n, 0, function.witnesses),
+        "meeting": (n, MOTION * function.bodies, MEETING),
+        "slope": (n, n, results),
     }
-    for part, (wanted, more, sizes) in parts.items():
-        if wanted:
-            text += f"EOMGEN_PIECE void {prefix}_{part}(const double *given, {more}double *out, double *work);\n"
-            text += _each(f"pairs_{function.name}_{part}", f"{prefix}_{part}", sizes)
-    if held:
-        text += f"EOMGEN_PIECE void {prefix}_held(const double *given, double *out, double *work);\n"
-    if again:
-        text += (
-            f"EOMGEN_PIECE void {prefix}_again(const double *given, const double *rates, double *out, double *met, "
-            f"double *kept);\n#define pairs_{function.name}_again {prefix}_again\n"
-        )
-    return text
+    for part, arguments in _parts(program, used, again).items():
+        text += f"EOMGEN_PIECE {_prototype(f'{prefix}_{part}', arguments)};\n"
+        if part in sizes:
+            text += _each(f"pairs_{function.name}_{part}", f"{prefix}_{part}", sizes[part])
+    return text + (f"#define pairs_{function.name}_again {prefix}_again\n" if again else "")
 
 
 def _each(name: str, called: str, sizes: tuple[int, int, int]) -> str:

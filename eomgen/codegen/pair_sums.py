@@ -133,8 +133,8 @@ def kept_of(function: PairFunction) -> int:
 
 
 def record_of(function: PairFunction) -> int:
-    """Numbers of one near pair that is kept: its kind, its two shapes, their bodies and what it exerts."""
-    return 5 + RESULT + max(kind.states for kind in function.kinds)
+    """Numbers of one near pair that is kept: its kind, its two shapes and what it exerts."""
+    return 3 + RESULT + max(kind.states for kind in function.kinds)
 
 
 class PairLists:
@@ -165,7 +165,7 @@ class PairLists:
         self._work = end
         self.end = end + work  #: where the work of the block ends with them
         #: sums of which derivatives are taken along one direction after another at one place, and the operands of C
-        #: that say where the count of near pairs and the pairs are kept (``pairs_again.c.j2``)
+        #: that say where the count of near pairs and the pairs are kept (``eomgen_pairs.h``)
         self.again: Mapping[str, str] = {}
 
     def call(self, i: int) -> PairCall | None:

@@ -76,7 +76,8 @@ def stack_of(sources: Iterable[str], name: str, sizes: Mapping[str, str]) -> dic
     of functions that another file calls; sizes are further numbers that lengths of arrays are made of.
     """
     texts = [_KERNEL.sub(_CALLED, text) for text in sources]
-    numbers = {word: value for text in texts for word, value in _NUMBER.findall(text)} | dict(sizes)
+    named = [pair for text in texts for pair in _NUMBER.findall(text)]  # of several, the greatest comes last
+    numbers = dict(sorted(named, key=lambda pair: int(pair[1]) if pair[1].isdigit() else -1)) | dict(sizes)
     structs = {name: body for text in texts for body, name in _STRUCT.findall(text)}
     types = "|".join(("real", "double", "float", "int", "flag", "bits", "short", *structs))
     declaration = re.compile(rf"^\s*(?:for \()?(?:const )?({types})\b([^;]*);", re.MULTILINE)

@@ -2,7 +2,7 @@
 
 The law of a pair reads the few numbers of these (:mod:`~eomgen.contact.polygons` says why those of edges), so that its
 text is the same for any number of corners or pieces.  They are found here by loops, and in C by those of
-``templates/c/pairs_shapes.c.j2``.
+``native/eomgen_pairs.h``.
 """
 
 from __future__ import annotations

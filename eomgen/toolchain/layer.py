@@ -13,6 +13,7 @@ from ..native.limits import definitions
 #: Headers of the solvers, which models include whose functions are not all straight-line code.
 SOLVER_HEADERS = ("eomgen_solvers.h", "eomgen_straight.h")
 SOLVER = "eomgen_solvers.c"
+PAIRS_HEADER = "eomgen_pairs.h"  #: included by models with contacts between groups alone
 
 #: The layer's files, the first translated by Cython, and what each is put together from, in order: a part may use what
 #: stands in those before it.
