@@ -414,6 +414,7 @@ class Table(Field):
 class Functions(Field):
     """A list of names of C functions, null for one that is not there."""
 
+    argument, annotation = "sequence", "Sequence[Any]"
     schema = array({"anyOf": [ref("name"), {"type": "null"}]})
 
 

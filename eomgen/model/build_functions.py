@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,10 +20,9 @@ from ..base.splines import curve_coefficients, slopes
 from ..elements import kinds
 from ..errors import UsageError
 from ..expr.functions import Curve, Function, NativeCode, Orders, PythonFallback, Surface, up_to
-from ..expr.records import dataclass
 from .checks import check_keys
 from .description import DescribedEntry, items
-from .fields import FUNCTION, function_fields
+from .fields import FUNCTION, PYTHON_SLOPES, function_fields
 from .names import fault_of_name
 from .quantities import QUANTITIES
 from .values import Reader, is_number
@@ -66,15 +65,6 @@ def _is_foreign(declared: str) -> bool:
 
 ARGUMENTS = 16  #: of one function
 SIZE = 1_000_000  #: bytes of one source file
-
-
-@dataclass(frozen=True)
-class FallbackSource:
-    """Callables that stand for a C function, its first and its second derivatives, None where one is not given."""
-
-    value: Callable[..., Any]
-    derivatives: Sequence[Any] = ()
-    second_derivatives: Sequence[Any] = ()
 
 
 def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
@@ -190,18 +180,20 @@ def _fallback(
 ) -> PythonFallback | None:
     """The Python fallback."""
     raw, path = entry.values.get("python"), f"{entry.path}.python"
+    functions: dict[Orders, Any] = {(0,) * arity: raw}
+    for key, total in zip(PYTHON_SLOPES, (1, 2), strict=True):
+        place, every, further = f"{entry.path}.{key}", list(up_to(arity, total)), entry.values.get(key) or None
+        if further and not callable(raw):
+            remedy = "give a callable; a Python file has derivatives under their C names"
+            reader.fault(place, "python_derivatives need a callable python", remedy, "EG-MISSING")
+        listed = _listed(reader, place, further, len(every))
+        functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
+    if callable(raw):
+        if not all(map(callable, functions.values())):
+            reader.fault(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
+        return PythonFallback(functions)
     if raw is None:
         return None
-    if isinstance(raw, FallbackSource):
-        functions = {(0,) * arity: raw.value}
-        for key, total in (("derivatives", 1), ("second_derivatives", 2)):
-            every = list(up_to(arity, total))
-            listed = _listed(reader, f"{entry.path}.python_{key}", getattr(raw, key) or None, len(every))
-            functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
-        if not all(callable(f) for f in functions.values()):
-            reader.fault(path, "is not a function", "give callables, or the path of a Python file", "EG-TYPE")
-            return None
-        return PythonFallback(functions)
     source = _read(reader, path, raw, entry.folder)
     if source is None:
         return None
@@ -250,7 +242,8 @@ def _arity_meant(entry: DescribedEntry) -> int:
 def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
     raw = reader.type_of(entry.path, entry.values, FUNCTION, "function")
     if raw:
-        check_keys(entry.path, entry.values, function_fields(raw), reader.faults)
+        fields = function_fields(raw) | (PYTHON_SLOPES if raw == "native" else {})
+        check_keys(entry.path, entry.values, fields, reader.faults)
     if reader.faults.under(entry.path):
         return None
     return build_native(reader, entry) if raw == "native" else read_table(reader, entry.name, entry.path, entry.values)

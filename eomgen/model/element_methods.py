@@ -6,7 +6,8 @@ from types import MethodType
 from typing import Any
 
 from ..elements.element_type import ElementType
-from .fields import BODY, ELEMENTS, EVENT, FUNCTION, INPUT, OUTPUT_FIELDS, PARAMETER, SOLID, STATE
+from ..elements.kinds import Functions
+from .fields import BODY, ELEMENTS, EVENT, FUNCTION, INPUT, OUTPUT_FIELDS, PARAMETER, PYTHON_SLOPES, SOLID, STATE
 from .handles import Described, JointHandle, References
 from .methods import method_of
 
@@ -68,12 +69,39 @@ SAMPLED = ElementType(
         **{key: STATE[key] for key in ("unit", "doc", "latex")},
     },
 )
+NATIVE = ElementType(
+    "native",
+    "a function written in C; its source is compiled with the model and goes into exported packages.",
+    {
+        "source": FUNCTION["native"]["source"].replace(
+            doc="C file that defines the functions named, each ``double f(double, ...)``; it includes nothing but "
+            "system headers, and its other functions are static",
+            annotation="Any",
+            argument="str or path",
+        ),
+        "function": FUNCTION["native"]["function"].replace(doc="C function of the value, ``name`` unless given"),
+        "arguments": FUNCTION["native"]["arguments"].replace(annotation="int", argument="int"),
+        "derivatives": Functions("C functions of the derivative along each argument; None gives a central difference"),
+        "second_derivatives": Functions(
+            "those along arguments 1 1, 1 2, ..., 2 2, ...; None gives a central difference of a first one"
+        ),
+        "python": FUNCTION["native"]["python"].replace(
+            doc="the same in Python, for what is evaluated without C: constraints, masses, target ``numpy``.  A "
+            "callable takes floats, one point at a time (a NumPy ufunc: arrays); a file has functions of the same "
+            "names as the C source",
+            annotation="Any",
+            argument="callable or path",
+        ),
+        **PYTHON_SLOPES,
+    },
+)
 
 
 def methods() -> dict[str, list[ElementType]]:
     """Section -> what its methods add."""
     single = {section: [one] for section, one in ENTRIES.items()}
     single["states"].append(SAMPLED)
+    single["functions"].append(NATIVE)
     return single | {section: [*types.values()] for section, types in ELEMENTS.items()}
 
 

@@ -132,6 +132,9 @@ FUNCTION: dict[str, Fields] = {
         "python": k.Text("Python file with functions of the same names, for evaluation without C"),
     },
 }
+_SLOPES = "``{}derivatives`` in Python, if ``python`` is a callable; None for a missing one"
+#: Keys of native functions that only calls in Python have.
+PYTHON_SLOPES: Fields = {f"python_{order}derivatives": k.Functions(_SLOPES.format(order)) for order in ("", "second_")}
 _MASS = k.Scalar("mass (kg), instead of a density", dimension=MASS)
 _DENSITIES = {
     "density": k.Scalar("density (kg/m^3)", dimension=Dimension(-3, 1)),

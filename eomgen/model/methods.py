@@ -5,12 +5,11 @@ Arguments, defaults and their documentation are those of the type's keys, so tha
 
 from __future__ import annotations
 
-import functools
 import inspect
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, Signature
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple
 
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import ElementType, Law
@@ -23,7 +22,6 @@ from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, Joint
 from .names import nearest
 from .sympy_face import function, symbol
 
-Method = TypeVar("Method", bound=Callable[..., Any])
 #: Section of elements -> what its methods return.
 _HANDLES: dict[str, Any] = {"joints": JointHandle, "forces": ForceHandle, "constraints": ConstraintHandle}
 #: Section -> what its methods return, and how it follows from the model and the entry; of others nothing.
@@ -264,21 +262,6 @@ def _where(refer: References, between: Sequence[Any], joint: Any) -> dict[str, A
 
 
 # -- keywords ----------------------------------------------------------------------------------------------------------
-def checked_keywords(method: Method) -> Method:
-    """A method that raises UsageError for a keyword it does not have, naming those it has."""
-    parameters = list(inspect.signature(method).parameters.values())[1:]
-    if any(p.kind is p.VAR_KEYWORD for p in parameters):
-        return method
-    allowed = [p.name for p in parameters if p.kind is not p.VAR_POSITIONAL]
-
-    @functools.wraps(method)
-    def checked(*args: Any, **keys: Any) -> Any:
-        check_keywords(method.__name__, keys, allowed)
-        return method(*args, **keys)
-
-    return cast("Method", checked)
-
-
 def keywords_of(function: Callable[..., Any]) -> list[str]:
     """Arguments of a function that are given by keyword only."""
     parameters = inspect.signature(function).parameters.values()

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
 from ..base.files import write_whole
 from ..base.names import hint
-from ..errors import UnavailableError, UsageError, at_odds, ill_typed, incomplete
-from .build_functions import FallbackSource
+from ..errors import UnavailableError, UsageError, at_odds, ill_typed
 from .build_mechanism import build
 from .components import Component, Instance, add_instance, attempt, component_of, named_attachments
-from .description import GROUND_NAME, SECTIONS, Description, Faults, items, model_html
+from .description import GROUND_NAME, SECTIONS, Description, Faults, model_html
 from .element_methods import ElementMethods
 from .equations import describe_equations, describe_lagrangian
 from .fields import ELEMENTS
@@ -29,11 +28,10 @@ from .handles import (
     Settings,
     Triple,
 )
-from .methods import check_keywords, checked_keywords, keywords_of
+from .methods import check_keywords, keywords_of
 from .names import fault_of_name
 from .quantities import COM
 from .sympy_face import SympyNames, named, names_of, one_or_several, require_name, symbol
-from .sympy_face import function as sympy_function
 from .yaml_file import describe_yaml_file, plain, plain_description, yaml_text
 
 if TYPE_CHECKING:
@@ -175,65 +173,6 @@ class Builder(ElementMethods):
     potential_energy = _symbol(
         "potential_energy", "The potential energy of gravity and springs, as a SymPy symbol for outputs."
     )
-
-    # -- functions ----------------------------------------------------------------------------------------------------
-    @checked_keywords
-    def native(
-        self,
-        name: str,
-        source: str | PathLike[str],
-        function: str | None = None,
-        arguments: int | None = None,
-        derivatives: Sequence[str | None] | None = None,
-        second_derivatives: Sequence[str | None] | None = None,
-        python: Callable[..., Any] | str | PathLike[str] | None = None,
-        python_derivatives: Sequence[Callable[..., Any] | None] | None = None,
-        python_second_derivatives: Sequence[Callable[..., Any] | None] | None = None,
-    ) -> Any:
-        """Declare a function written in C; its source is compiled with the model and goes into exported packages.
-
-        Parameters
-        ----------
-        name : str
-            Identifier.
-        source : str or path
-            C file that defines the functions named, each ``double f(double, ...)``; it includes nothing but system
-            headers, and its other functions are static.
-        function : str, optional
-            C function of the value, ``name`` unless given.
-        arguments : int, optional
-            Their number; that of the derivatives unless given, or 1.
-        derivatives : sequence of str or None, optional
-            C functions of the derivative along each argument; a missing one is a central difference.
-        second_derivatives : sequence of str or None, optional
-            Those along arguments 1 1, 1 2, ..., 2 2, ...; a missing one is a central difference of a first one.
-        python : callable or path, optional
-            The same in Python, for what is evaluated without C: constraints, masses, target ``numpy``.  A callable
-            takes floats, one point at a time (a NumPy ufunc: arrays); a file has functions of the same names as the C
-            source.
-        python_derivatives, python_second_derivatives : sequence of callable or None, optional
-            As ``derivatives`` and ``second_derivatives``, if ``python`` is a callable.
-
-        Returns
-        -------
-        sympy.Function
-        """
-        fallback: Any = None if python is None else str(python) if isinstance(python, str | PathLike) else python
-        further: list[Any] = [
-            items(() if raw is None else raw) for raw in (python_derivatives, python_second_derivatives)
-        ]
-        if None in further:
-            raise ill_typed(f"native {name}: python_derivatives must be lists of functions")
-        if fallback is not None and not isinstance(fallback, str):
-            fallback = FallbackSource(fallback, *further)
-        elif any(further):
-            raise incomplete(
-                "python_derivatives need a callable python=; a Python file holds derivatives under their C names"
-            )
-        raw: dict[str, Any] = {"type": "native", "source": str(source), "function": function, "arguments": arguments}
-        raw |= {"derivatives": derivatives, "second_derivatives": second_derivatives, "python": fallback}
-        self._add("functions", name, {key: value for key, value in raw.items() if value is not None})
-        return sympy_function(name)
 
     # -- bodies ---------------------------------------------------------------------------------------------------
     @property

@@ -247,8 +247,8 @@ def test_python_files_that_do_not_fit_are_reported(sources: Path) -> None:
     ):
         with refused(message):
             pendulum("-swing(q)", full(sources, python=sources / file)).check()
-    with refused("EG-MISSING python_derivatives"):
-        eg.Model("m").native("f", "f.c", python="f.py", python_derivatives=[math.cos])
+    with refused("EG-MISSING functions.swing.python_derivatives"):
+        pendulum("-swing(q)", full(sources, python=sources / "other.py", python_derivatives=[math.cos])).check()
     with refused("EG-NAME-UNKNOWN sorce"):
         eg.Model("m").native("f", sorce="f.c")  # type: ignore[call-arg]
 
