@@ -24,124 +24,67 @@ from .expressions import names_in
 from .fields import EQUATIONS, LAGRANGIAN
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output, Switched
 from .names import ENERGIES, RATES, fault_of_name
-from .sympy_face import derivative_names, free_names, function_names, in_order, name_of, named, names_of, values_in
+from .sympy_face import (
+    SympyNames,
+    derivative_names,
+    free_names,
+    function_names,
+    in_order,
+    name_of,
+    named,
+    names_of,
+    one_or_several,
+    values_in,
+)
 from .values import MULTIPLIERS, Reader, give_latex, numbered, take_coordinates_latex
 
 # -- what Python gives -------------------------------------------------------------------------------------------------
 
 
-def describe_lagrangian(
-    name: str, L: Any, coordinates: Any, forces: Any, dissipation: Any, constraints: Any, parameters: Any, inputs: Any,
-    latex: Any,
-) -> Description:  # fmt: skip
-    """Describe a system by its Lagrangian; arguments as for ``Model.from_lagrangian``."""
-    names = names_of("lagrangian.coordinates", coordinates, "a coordinate")
-    raw: dict[str, Any] = {"coordinates": names, "expression": L}
-    if forces is not None:
-        raw["forces"] = named("forces", forces) if isinstance(forces, Mapping) else forces
-    if dissipation is not None:
-        raw["dissipation"] = dissipation
-    if items(constraints) or not isinstance(constraints, list | tuple):
-        raw["constraints"] = constraints
-    values, driven = named("parameters", parameters), named("inputs", inputs)
-    known = {q + rate for q in names for rate in RATES}
-    stems = {split_rate(source)[0] for source in driven}
-    used = {*_names_of_section(raw), *derivative_names([*values_in(raw)])} - {*known, *values, *driven}
-    rates = dict.fromkeys(name for name in sorted(used) if split_rate(name)[0] in stems)
-    return _describe(name, "lagrangian", raw, known, values, driven | rates, latex)
+#: Keys of names, and what each is.
+_NAMES = {"coordinates": "a coordinate", "velocities": "a velocity", "multipliers": "a multiplier"}
 
 
-def _describe(
-    name: str, section: str, raw: dict[str, Any], known: set[str], parameters: Mapping[str, Any],
-    inputs: Mapping[str, Any], latex: Any,
-) -> Description:  # fmt: skip
-    """The description of a section; of the names in it that it does not declare those are parameters that no input is.
+def describe(name: str, section: str, raw: Mapping[str, Any]) -> Description:
+    """Describe a system by a Lagrangian or by equations; ``raw`` has values of the section and of other arguments.
 
-    ``known`` are names that the section declares.
+    Of the names in the section those that it does not declare are parameters, unless they are inputs.
     """
-    description = Description(values={"name": name, section: raw})
+    coordinates = one_or_several(raw["coordinates"])
+    changed = SympyNames({key: x for key, x in raw.items() if key != "latex"}, coordinates)
+    raw, latex = changed.put({**raw, "coordinates": coordinates}), changed.latex(raw.get("latex"))
+    values: dict[str, Any] = {}
+    for key, field in (LAGRANGIAN if section == "lagrangian" else EQUATIONS).items():
+        value = _raw_value(section, key, raw.get(key))
+        empty = isinstance(value, list | tuple | dict) and not value and not field.required
+        if key != "latex" and value is not None and not empty:
+            values[key] = value
+    parameters, inputs = named("parameters", raw.get("parameters")), named("inputs", raw.get("inputs"))
+    known = {part + rate for key in ("coordinates", "velocities") for part in values.get(key, ()) for rate in RATES}
+    known |= {*values.get("intermediates", ()), *values.get("multipliers", ())}
+    if section == "lagrangian":  # which contains derivatives of inputs by time
+        stems = {split_rate(source)[0] for source in inputs}
+        used = {*_names_of_section(values), *derivative_names([*values_in(values)])} - {*known, *parameters, *inputs}
+        inputs |= dict.fromkeys(name for name in sorted(used) if split_rate(name)[0] in stems)
     known |= {*inputs}
+    description = Description(values={"name": name, section: values})
     own = {name: value for name, value in parameters.items() if name not in known}
-    description.declare(own, inputs, [name for name in _names_of_section(raw) if name not in known])
+    description.declare(own, inputs, [name for name in _names_of_section(values) if name not in known])
     give_latex(description, section, latex)
-    return description
+    return changed.noted(description)
 
 
-def describe_equations(
-    name: str,
-    coordinates: Sequence[Any],
-    mass_matrix: Any,
-    forcing: Any,
-    *,
-    velocities: Sequence[Any] | None = None,
-    rates: Mapping[Any, Any] | None = None,
-    intermediates: Mapping[Any, Any] | None = None,
-    constraints: Sequence[Any] = (),
-    multipliers: Sequence[Any] = (),
-    kinetic_energy: Any = None,
-    potential_energy: Any = None,
-    parameters: Mapping[Any, Any] | None = None,
-    inputs: Mapping[Any, Any] | None = None,
-    latex: Mapping[Any, str] | None = None,
-) -> Description:
-    """Describe a system by its equations of motion M v' = f, as the section ``equations`` of a model file does.
-
-    Values are numbers, texts or SymPy expressions in symbols or functions of time.
-
-    Parameters
-    ----------
-    name : str
-        Identifier; the generated module bears it.
-    coordinates : sequence
-        Generalized coordinates q, in order.
-    mass_matrix : (n, n) array or SymPy matrix
-        M(q, t), symmetric.
-    forcing : sequence of n
-        f(q, v, t, inputs).
-    velocities : sequence of n, optional
-        Generalized velocities v; ``<coordinate>_dot`` unless given.
-    rates : mapping, optional
-        q' by coordinate, linear in v; the velocities in order unless given.
-    intermediates : mapping, optional
-        Named parts of the expressions; each may use those before it.
-    constraints : sequence, optional
-        Expressions that are 0: functions of coordinates and t, or linear in the velocities.
-    multipliers : sequence of str, optional
-        Names of the multipliers of the constraints, for outputs: M v' + C_q^T l = f.
-    kinetic_energy, potential_energy : optional
-        In J, for the balance of energy.
-    parameters : mapping, optional
-        Values by symbol or name.  Every other free symbol becomes a parameter without a value.
-    inputs : mapping, optional
-        Quantities given over time, by symbol or name: the value that holds while none is given.
-    latex : mapping, optional
-        How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``.
-
-    Returns
-    -------
-    Description
-    """
-    names = names_of("equations.coordinates", coordinates, "a coordinate")
-    speeds = names_of("equations.velocities", velocities, "a velocity")
-    raw: dict[str, Any] = {"coordinates": names}
-    if speeds:
-        raw["velocities"] = speeds
-    for key, table in (("rates", rates), ("intermediates", intermediates)):
-        if values := named(key, table):
-            raw[key] = values
-    rows = [items(row) for row in items(mass_matrix) or ()]
-    if rows and all(row is None for row in rows):  # one coordinate: SymPy's 1 x 1 matrix counts as a plain list
-        rows = [items(mass_matrix)]
-    raw |= {"mass_matrix": rows or mass_matrix, "forcing": items(forcing) or forcing}
-    if items(constraints):
-        raw["constraints"] = items(constraints)
-    if forces := names_of("equations.multipliers", multipliers, "a multiplier"):
-        raw["multipliers"] = forces
-    energies = {"kinetic_energy": kinetic_energy, "potential_energy": potential_energy}
-    raw |= {key: energy for key, energy in energies.items() if energy is not None}
-    known = {part + rate for part in (*names, *speeds) for rate in RATES}
-    known |= {*raw.get("intermediates", ()), *raw.get("multipliers", ())}
-    return _describe(name, "equations", raw, known, named("parameters", parameters), named("inputs", inputs), latex)
+def _raw_value(section: str, key: str, value: Any) -> Any:
+    """A value as a model file would write it: names as texts, arrays as lists."""
+    if key in _NAMES:
+        return names_of(f"{section}.{key}", value, _NAMES[key])
+    if isinstance(value, Mapping) or key in ("rates", "intermediates"):
+        return named(key, value)
+    listed = items(value)
+    if key != "mass_matrix" or not listed:
+        return listed or value
+    rows = [items(row) for row in listed]
+    return rows if any(row is not None for row in rows) else [listed]  # SymPy's 1 x 1 matrix counts as a plain list
 
 
 def _names_of_section(raw: Mapping[str, Any]) -> list[str]:

@@ -5,7 +5,6 @@ Arguments, defaults and their documentation are those of the type's keys, so tha
 
 from __future__ import annotations
 
-import inspect
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, Signature
@@ -262,12 +261,6 @@ def _where(refer: References, between: Sequence[Any], joint: Any) -> dict[str, A
 
 
 # -- keywords ----------------------------------------------------------------------------------------------------------
-def keywords_of(function: Callable[..., Any]) -> list[str]:
-    """Arguments of a function that are given by keyword only."""
-    parameters = inspect.signature(function).parameters.values()
-    return [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
-
-
 def check_keywords(name: str, raw: Iterable[str], allowed: Sequence[str]) -> None:
     """Raise UsageError for the first keyword that a method does not have."""
     for key in raw:

@@ -15,8 +15,8 @@ from .build_mechanism import build
 from .components import Component, Instance, add_instance, attempt, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, model_html
 from .element_methods import ElementMethods
-from .equations import describe_equations, describe_lagrangian
-from .fields import ELEMENTS
+from .equations import describe
+from .fields import ELEMENTS, EQUATIONS
 from .handles import (
     BodyHandle,
     Described,
@@ -28,10 +28,10 @@ from .handles import (
     Settings,
     Triple,
 )
-from .methods import check_keywords, keywords_of
+from .methods import check_keywords
 from .names import fault_of_name
 from .quantities import COM
-from .sympy_face import SympyNames, named, names_of, one_or_several, require_name, symbol
+from .sympy_face import named, names_of, require_name, symbol
 from .yaml_file import describe_yaml_file, plain, plain_description, yaml_text
 
 if TYPE_CHECKING:
@@ -145,23 +145,54 @@ class Builder(ElementMethods):
         ModelError
             A coordinate is neither a symbol nor a function of time ``q(t)``.
         """
-        coordinates = one_or_several(coordinates)
-        raw = [L, coordinates, forces, dissipation, constraints, parameters, inputs]
-        names = SympyNames(raw, coordinates)
-        return cls.from_description(names.noted(describe_lagrangian(name, *names.put([*raw, names.latex(latex)]))))
+        raw = {"coordinates": coordinates, "expression": L, "forces": forces, "dissipation": dissipation}
+        raw |= {"constraints": constraints, "parameters": parameters, "inputs": inputs, "latex": latex}
+        return cls.from_description(describe(name, "lagrangian", raw))
 
     @classmethod
     def from_equations(
         cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
     ) -> Self:
-        """Make a model from equations M v' = f; see :func:`eomgen.model.equations.describe_equations`."""
-        check_keywords("from_equations", further, keywords_of(describe_equations))
-        coordinates = one_or_several(coordinates)
-        names = SympyNames([coordinates, mass_matrix, forcing, further], coordinates)
-        further = names.put(further) | {"latex": names.latex(further.get("latex"))}
-        return cls.from_description(
-            names.noted(describe_equations(name, *names.put([coordinates, mass_matrix, forcing]), **further))
-        )
+        """Make a model from equations of motion M v' = f, as the section ``equations`` of a model file does.
+
+        Values are numbers, texts or SymPy expressions in symbols or functions of time.
+
+        Parameters
+        ----------
+        name : str
+            Identifier; the generated module bears it.
+        coordinates : sequence
+            Generalized coordinates q, in order.
+        mass_matrix : (n, n) array or SymPy matrix
+            M(q, t), symmetric.
+        forcing : sequence of n
+            f(q, v, t, inputs).
+        velocities : sequence of n, optional
+            Generalized velocities v; ``<coordinate>_dot`` unless given.
+        rates : mapping, optional
+            q' by coordinate, linear in v; the velocities in order unless given.
+        intermediates : mapping, optional
+            Named parts of the expressions; each may use those before it.
+        constraints : sequence, optional
+            Expressions that are 0: functions of coordinates and t, or linear in the velocities.
+        multipliers : sequence of str, optional
+            Names of the multipliers of the constraints, for outputs: M v' + C_q^T l = f.
+        kinetic_energy, potential_energy : optional
+            In J, for the balance of energy.
+        parameters : mapping, optional
+            Values by symbol or name.  Every other free symbol becomes a parameter without a value.
+        inputs : mapping, optional
+            Quantities given over time, by symbol or name: the value that holds while none is given.
+        latex : mapping, optional
+            How formulas and plots print coordinates, parameters and inputs, by symbol or name: ``{q: r"\\varphi"}``.
+
+        Returns
+        -------
+        Model
+        """
+        check_keywords("from_equations", further, [*EQUATIONS, "parameters", "inputs"])
+        raw = {"coordinates": coordinates, "mass_matrix": mass_matrix, "forcing": forcing}
+        return cls.from_description(describe(name, "equations", raw | further))
 
     # -- names -----------------------------------------------------------------------------------------------------
     def coordinate(self, name: str) -> Any:
