@@ -314,12 +314,7 @@ class BodyHandle(MarkerHandle):
         -------
         MarkerHandle
         """
-        reference: dict[str, Any] = {"body": self.name, "at": (x, y, z)}
-        if not is_zero(rpy):
-            listed = items(rpy)
-            reference["rpy"] = rpy if listed is None else tuple(listed)
-        reference |= _turned(axes, matrix)
-        return MarkerHandle(self.model, reference)
+        return MarkerHandle(self.model, {"body": self.name, **_placed((x, y, z), rpy, axes, matrix)})
 
     def marker(
         self,
@@ -349,15 +344,19 @@ class BodyHandle(MarkerHandle):
         """
         if self._entry is None:
             self._entry = self.model._add("bodies", GROUND_NAME, {})
-        placed: dict[str, Any] = {"at": at}
-        if not is_zero(rpy):
-            placed["rpy"] = rpy
-        placed |= _turned(axes, matrix)
+        placed = _placed(at, rpy, axes, matrix)
         self.model._note_line(f"{self._entry.path}.markers.{name}")
         markers = self._entry.values.get("markers", [])
         listed = list(markers.items()) if isinstance(markers, dict) else list(markers)
         self._entry.values["markers"] = [*listed, (name, placed)]
         return MarkerHandle(self.model, f"{self.name}.{name}")
+
+
+def _placed(at: Any, rpy: Any, axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
+    """A place in a body."""
+    listed = items(rpy)
+    turn = {} if is_zero(rpy) else {"rpy": rpy if listed is None else tuple(listed)}
+    return {"at": at, **turn, **_turned(axes, matrix)}
 
 
 def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:

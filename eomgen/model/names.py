@@ -75,18 +75,12 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
         return f"{quoted(name)} is not an identifier", remedy + IDENTIFIER_RULE
     if len(name) > LONGEST:
         return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"
-    if keyword.iskeyword(name):
-        return f"{name!r} is a reserved word of Python", f"choose another name, e.g. {name}_"
-    if symbol:
-        if name in _C_KEYWORDS:
-            return f"{name!r} is a reserved word of C", f"choose another name, e.g. {name}_"
-        if name == "t":
-            return "'t' is reserved for the time", "choose another name"
-        if name == "pi":
-            return "'pi' is reserved for the number pi", "choose another name"
-        if name in callable_names():
-            return f"{name!r} is a built-in function", f"choose another name, e.g. {name}_"
-    return None
+    if name in ("t", "pi") and symbol:
+        return f"{name!r} is reserved for the {'time' if name == 't' else 'number pi'}", "choose another name"
+    what = "a reserved word of Python" if keyword.iskeyword(name) else ""
+    if symbol and not what:
+        what = "a reserved word of C" if name in _C_KEYWORDS else "a built-in function" * (name in callable_names())
+    return (f"{name!r} is {what}", f"choose another name, e.g. {name}_") if what else None
 
 
 def clean_name(name: str, kind: str) -> str:
