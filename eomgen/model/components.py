@@ -74,9 +74,9 @@ class Component:
         sections = self.description.sections
         named = {place: {e.name for e in entries if isinstance(e.name, str)} for place, entries in sections.items()}
         self.size = size_of(self.description) + 1
-        self.given = {e.name: e for place in ("parameters", "inputs") for e in sections[place]}
+        self.settable = {e.name: e for place in ("parameters", "inputs") for e in sections[place]}
         self.bodies, self.elements = named["bodies"] - {GROUND_NAME}, named["joints"] | named["constraints"]
-        faults = Faults(Description())  # told where the model is checked
+        faults = Faults(Description())  # noted where the model is checked
         reader = Reader(Graph(), Namespace(faults), faults, self.description)
         declare_coordinates(reader, sections["joints"])
         declare_contacts(reader, sections["constraints"])
@@ -106,7 +106,7 @@ class Attached(NamedTuple):
 
 
 class Renaming(Visitor):
-    """A component's names as an instance has them, its attachments the markers given, its parameters put in.
+    """A component's names as an instance has them, its attachments the markers given, its parameters replaced.
 
     ``prefix`` is put before every name of the component; ``values`` are expressions of the model in the place of
     parameters and inputs, ``attached`` markers by attachment, ground among them.  ``fault`` notes names that the
@@ -309,7 +309,7 @@ def add_instance(
         target.bindings.append(binding._replace(instance=whole_name, text=text))
     for name in texts:
         if instance.values.get(name, (None,))[0] is not None:
-            place, unit = instance.values[name][1], component.given[name].values.get("unit")
+            place, unit = instance.values[name][1], component.settable[name].values.get("unit")
             target.bindings.append(Binding(place, instance.name, texts[name], unit))
             target.origins[place] = Origin(place, "", "")
 
@@ -393,11 +393,11 @@ def _values(
 ) -> tuple[dict[str, Any], dict[str, str], dict[str, str]]:
     """Numbers of parameters and inputs that stay, texts in the place of those that do not; units given with numbers."""
     for name, (_, place) in instance.values.items():
-        if name not in component.given:
-            remedy = nearest(str(name), component.given, "parameters and inputs")
+        if name not in component.settable:
+            remedy = nearest(str(name), component.settable, "parameters and inputs")
             faults.add(place, f"{component.name} has no parameter or input {name!r}", remedy, "EG-NAME-UNKNOWN")
     numbers, texts, units = dict[str, Any](), dict[str, str](), dict[str, str]()
-    for name, entry in component.given.items():
+    for name, entry in component.settable.items():
         read = attempt(faults.add, read_instance_value, entry, *instance.values.get(name, (None, "")))
         raw, unit = read or (None, None)
         if raw is not None and is_constant(raw):
@@ -534,15 +534,15 @@ def _counted(raw: Mapping[str, Any]) -> list[Any] | None:
     return [(int if whole else float)(begin + k * by) for k in range(max(0, min(count, ROUNDS + 1)))]
 
 
-def put_in(value: Any, variables: Round) -> Any:
-    """A value, or all that it holds, with the variables of a round put in."""
+def with_variables(value: Any, variables: Round) -> Any:
+    """A value, or all that it holds, in which the variables of a round have their values."""
     if isinstance(value, str):
         if value.strip() in variables:
             return variables[value.strip()]
         return rewritten(value, lambda name: in_brackets(str(variables[name])) if name in variables else name)
     if isinstance(value, Mapping):
-        return {key: part if key == "body" else put_in(part, variables) for key, part in value.items()}
-    return [put_in(part, variables) for part in value] if isinstance(value, list | tuple) else value
+        return {key: part if key == "body" else with_variables(part, variables) for key, part in value.items()}
+    return [with_variables(part, variables) for part in value] if isinstance(value, list | tuple) else value
 
 
 ENTRIES = 20_000  #: most entries and instances of a model that its components make
@@ -551,7 +551,7 @@ ENTRIES = 20_000  #: most entries and instances of a model that its components m
 # -- the sections of a model file --------------------------------------------------------------------------------------
 #: Reads the sections of a mapping into a description: mapping, path before its keys, the description.
 Fill = Callable[[Mapping[str, Any], str, Description], None]
-#: Reads a file that the model file names; None where it is at fault, which is told.
+#: Reads a file that the model file names; None where it is at fault, which is noted.
 Open = Callable[[str], Description | None]
 
 
@@ -566,20 +566,20 @@ class Components:
         self, raw: Any, lines: Mapping[str, tuple[str, int]], fill: Fill, open_file: Open, faults: Faults
     ) -> None:
         self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
-        self.given = faults.mapping("components", raw, "write the names of the components as keys")
+        self.listed = faults.mapping("components", raw, "write the names of the components as keys")
         self.read: dict[str, Component | None] = {}
         self.within: list[str] = []
         self.incomplete = False  #: whether an instance could not be added
 
     def read_all(self) -> None:
-        """Read also those that nothing adds, so that their faults are told."""
-        for name in self.given:
+        """Read also those that nothing adds, so that their faults are noted."""
+        for name in self.listed:
             attempt(self.fault, self.find, name, f"components.{name}")
 
     def find(self, name: Any, path: str) -> Component:
-        """The component of a name; refused where there is none, or it has faults, which are told."""
-        if not isinstance(name, str) or name not in self.given:
-            remedy = nearest(str(name), self.given, "components")
+        """The component of a name; refused where there is none, or it has faults, which are noted."""
+        if not isinstance(name, str) or name not in self.listed:
+            remedy = nearest(str(name), self.listed, "components")
             raise Refused(path, f"no component {name!r}", remedy, "EG-NAME-UNKNOWN")
         if name in self.within:
             chain = ", ".join([*self.within[self.within.index(name) :], name])
@@ -587,7 +587,7 @@ class Components:
             raise Refused(path, message, "remove one of these additions", "EG-CIRCLE")
         if name not in self.read:
             self.within.append(name)
-            self.read[name] = attempt(self.fault, self._read, name, self.given[name], f"components.{name}")
+            self.read[name] = attempt(self.fault, self._read, name, self.listed[name], f"components.{name}")
             self.within.pop()
         if (result := self.read[name]) is None:
             raise Refused
@@ -657,7 +657,7 @@ class Components:
             if key not in ADDED:
                 self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED), "EG-NAME-UNKNOWN")
         if "component" not in keys:
-            raise Refused(f"{path}.component", "is missing", nearest("", self.given, "components"), "EG-MISSING")
+            raise Refused(f"{path}.component", "is missing", nearest("", self.listed, "components"), "EG-MISSING")
         component = attempt(self.fault, self.find, keys["component"], f"{path}.component")
         rounds = attempt(self.fault, rounds_of, keys["for"], f"{path}.for") if "for" in keys else [{}]
         prefix = keys.get("prefix", f"{name}_")
@@ -681,11 +681,13 @@ def _instance(
     component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Round, path: str
 ) -> Instance:
     """The instance of a round."""
-    tables = {key: put_in(keys.get(key) or {}, variables) for key in ("parameters", "inputs", "initial", "guess")}
+    tables = {
+        key: with_variables(keys.get(key) or {}, variables) for key in ("parameters", "inputs", "initial", "guess")
+    }
     for key, raw in tables.items():
         if not isinstance(raw, Mapping):
             raise Refused(f"{path}.{key}", f"is not {kinds.Table.says}", "write names as keys", "EG-TYPE")
-    at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
+    at = with_variables(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
     values = {n: (x, f"{path}.{key}.{n}") for key in ("parameters", "inputs") for n, x in tables[key].items()}
     attached = named_attachments(component, at, f"{path}.at")
     return Instance(name, prefix, attached, values, tables["initial"], tables["guess"])
@@ -746,7 +748,7 @@ def with_instance(latex: str, instance: str) -> str:
     latex = spaced(latex)
     try:
         tree = read_latex(latex)
-    except NotationError:  # told when the model is checked
+    except NotationError:  # noted when the model is checked
         return latex
     while isinstance(tree, Group) and len(tree.parts) > 1:
         head = head_of(tree) or tree.parts[0]
