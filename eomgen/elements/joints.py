@@ -587,10 +587,6 @@ class Free(RotatingJoint):
 # -- guides: S is led by a curve or a surface of P; they stay in the tree ----------------------------------------------
 
 
-ALONG_CURVE = (Coordinate("_s", "length"),)
-ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
-
-
 class GuidePoint(Vector):
     """Three expressions [x, y, z] of the joint's own first coordinates and of parameters."""
 
@@ -611,22 +607,6 @@ class GuidePoint(Vector):
 
     def absent(self, reader: Any) -> Shape:
         return Shape((reader.stand_in,) * 3, ())
-
-
-CURVE = GuidePoint(
-    "point of the curve in the predecessor's axes (m), as expressions of the joint's coordinate s",
-    required=True,
-    level=MOTION,
-    own=1,
-    dimension=LENGTH,
-)
-SURFACE = GuidePoint(
-    "point of the surface in the predecessor's axes (m), as expressions of the joint's coordinates u and v",
-    required=True,
-    level=MOTION,
-    own=2,
-    dimension=LENGTH,
-)
 
 
 class Guide(Joint):
@@ -675,16 +655,6 @@ class Guide(Joint):
         raise TypeError(f"a {self.type_name} joint cannot be cut")
 
 
-class TurningGuide(Guide):
-    """A guide on which S also turns freely about its origin, in Euler angles."""
-
-    sequence: str
-
-    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
-        angles = q[len(self.shape.parameters) :]
-        return euler(graph, self.sequence, angles), euler_rates(graph, self.sequence, angles)
-
-
 class CurveSlider(Guide):
     """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
 
@@ -692,8 +662,16 @@ class CurveSlider(Guide):
         "The origin of S slides along a curve of P without turning; the coordinate is the parameter of the curve."
     )
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q)"
-    coordinates = (Coordinate("", "length"),)
-    curve: Shape = key(CURVE)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
+    curve: Shape = key(
+        GuidePoint(
+            "point of the curve in the predecessor's axes (m), as expressions of the joint's coordinate s",
+            required=True,
+            level=MOTION,
+            own=1,
+            dimension=LENGTH,
+        )
+    )
 
 
 class SurfaceSlider(Guide):
@@ -703,11 +681,29 @@ class SurfaceSlider(Guide):
         "The origin of S slides on a surface of P without turning; the coordinates are the parameters of the surface."
     )
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = \mathbf{r}(q_1,q_2)"
-    coordinates = ON_SURFACE
-    surface: Shape = key(SURFACE)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_u", "length"), Coordinate("_v", "length"))
+    surface: Shape = key(
+        GuidePoint(
+            "point of the surface in the predecessor's axes (m), as expressions of the joint's coordinates u and v",
+            required=True,
+            level=MOTION,
+            own=2,
+            dimension=LENGTH,
+        )
+    )
 
 
-class PointOnCurve(TurningGuide):
+class TurningGuide(Guide):
+    """A guide on which S also turns freely about its origin, in Euler angles."""
+
+    sequence: str = key(SEQUENCE)
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        angles = q[len(self.shape.parameters) :]
+        return euler(graph, self.sequence, angles), euler_rates(graph, self.sequence, angles)
+
+
+class PointOnCurve(TurningGuide, CurveSlider):
     """The origin of S slides along a curve of P; S turns freely, in Euler angles.  Allows 4, removes 2.
 
     A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
@@ -715,19 +711,15 @@ class PointOnCurve(TurningGuide):
 
     sentence = "The origin of S slides along a curve of P, and S turns freely."
     formula = r"\mathbf{u} = \mathbf{r}(q_1)"
-    coordinates = (*ALONG_CURVE, *ANGLES)
-    curve: Shape = key(CURVE)
-    sequence: str = key(SEQUENCE)
+    coordinates = (Coordinate("_s", "length"), *ANGLES)
 
 
-class PointOnSurface(TurningGuide):
+class PointOnSurface(TurningGuide, SurfaceSlider):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
     sentence = "The origin of S slides on a surface of P, and S turns freely."
     formula = r"\mathbf{u} = \mathbf{r}(q_1,q_2)"
-    coordinates = (*ON_SURFACE, *ANGLES)
-    surface: Shape = key(SURFACE)
-    sequence: str = key(SEQUENCE)
+    coordinates = (*SurfaceSlider.coordinates, *ANGLES)
 
 
 # -- rods and conditions on axes, without coordinates ------------------------------------------------------------------
@@ -763,9 +755,9 @@ class Distance(RodJoint):
 
     sentence = "The origins of P and S stay at the distance $l$, as by a massless rod with a ball at each end."
     formula = r"\mathbf{u}^T \mathbf{u} - l^2 = 0"
+    removes = 1
     look = JointLook((SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True)
     has_axis = False
-    removes = 1
     length: Expr = key(ROD_LENGTH)
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
@@ -777,8 +769,8 @@ class RevoluteSpherical(RodJoint):
 
     sentence = "A massless rod of length $l$ turns about the axis {z} of P and holds S by a ball."
     formula = r"u_{z} = 0, \quad u_{x}^2 + u_{y}^2 - l^2 = 0"
-    look = JointLook((SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True)
     removes = 2
+    look = JointLook((SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True)
     fixed_axes = "z"
     length: Expr = key(ROD_LENGTH)
 
@@ -791,8 +783,8 @@ class Inline(RodJoint):
 
     sentence = "The origin of S stays on the axis {z} of P."
     formula = r"u_{x} = 0, \quad u_{y} = 0"
-    look = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     removes = 2
+    look = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     fixed_axes = "xy"
 
 
@@ -801,8 +793,8 @@ class Inplane(RodJoint):
 
     sentence = "The origin of S stays in the plane of P across the axis {z}."
     formula = r"u_{z} = 0"
-    look = JointLook((SymbolPart("sphere", (0.8,)),))
     removes = 1
+    look = JointLook((SymbolPart("sphere", (0.8,)),))
     fixed_axes = "z"
 
 
@@ -831,8 +823,8 @@ class Orientation(RodJoint):
 
     sentence = "The axes of S stay parallel to those of P; the origins are free."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}"
-    has_axis = False
     removes = 3
+    has_axis = False
     parallel_axes = "xyz"
 
 

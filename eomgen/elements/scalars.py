@@ -75,9 +75,9 @@ def about(axis: int, c: Scalar, s: Scalar) -> list[list[Scalar]]:
     return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
 
 
-def matrix_from_roll_pitch_yaw(angles: Iterable[Scalar]) -> list[list[Scalar]]:
+def matrix_from_roll_pitch_yaw(angles: Iterable[Scalar], snap: float = 0.0) -> list[list[Scalar]]:
     """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF."""
-    x, y, z = (about(axis, *cosine_and_sine(angle)) for axis, angle in enumerate(angles))
+    x, y, z = (about(axis, *cosine_and_sine(angle, snap)) for axis, angle in enumerate(angles))
     return times(z, times(y, x))
 
 

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from ..elements.kinds import limits_nothing
-from ..elements.matrices import about, from_quaternion
 from ..errors import MissingDependencyError, ModelError, Problem, at_odds
 from .limits import ELEMENTS, IMPEDANCE, LARGEST, MEMORY, SECONDS, SIZE, WAIT
 from .mujoco_process import compile_model
@@ -37,8 +36,10 @@ from .robot import (
     RobotOptions,
     Sum,
     Tie,
+    by_quaternion,
     moved,
     numbers,
+    turned,
 )
 from .xml_file import DATA, HARMLESS, LEFT, SEEN, TAKEN, Constructs, XmlElement, read_xml
 
@@ -338,10 +339,9 @@ class _MjcfReader:
         m, robot = self.m, self.robot
         name, parent = self.names["body"][k], self.names["body"][m.body_parentid[k]]
         place = self.place(name, "body")
-        rotation = from_quaternion(*m.body_iquat[k])
-        tensor = rotation @ np.diag(m.body_inertia[k]) @ rotation.T
-        inertia = Inertia(float(m.body_mass[k]), np.array(m.body_ipos[k]), (tensor + tensor.T) / 2)
-        at = Placement(from_quaternion(*m.body_quat[k]), np.array(m.body_pos[k]))
+        principal = Inertia(float(m.body_mass[k]), np.zeros(3), np.diag(m.body_inertia[k]))
+        inertia = principal.seen(by_quaternion(m.body_ipos[k], m.body_iquat[k]))
+        at = by_quaternion(m.body_pos[k], m.body_quat[k])
         joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
         if not joints:
             robot.joints[f"{name} weld"] = RobotJoint(f"{name} weld", "weld", parent, name, place, outer=at)
@@ -394,11 +394,11 @@ class _MjcfReader:
                     self.robot.notes.append(f"left out: the {what} of the {kind} joint {name}")
             if kind == "spherical":
                 return joint if still else replace(joint, armature=float(m.dof_armature[dof]))
-            pose = Placement(from_quaternion(*m.qpos0[start + 3 : start + 7]), m.qpos0[start : start + 3])
+            pose = by_quaternion(m.qpos0[start : start + 3], m.qpos0[start + 3 : start + 7])
             return replace(joint, outer=IDENTITY, inner=IDENTITY, start=pose)
         axis = numbers(m.jnt_axis[j])
         q0 = float(m.qpos0[start])
-        back = Placement(about(axis, -q0), np.zeros(3)) if kind == "revolute" else moved(-q0 * np.array(axis))
+        back = turned(axis, -q0) if kind == "revolute" else moved(-q0 * np.array(axis))
         limits = dict(zip(("lower", "upper"), numbers(m.jnt_range[j]), strict=True)) if limited else {}
         clamp = None
         if m.jnt_actfrclimited[j]:
@@ -450,16 +450,16 @@ class _MjcfReader:
         kind = "weld" if weld and data[10] else "spherical"  # torquescale 0: the weld's rows of rotation vanish
         ids = m.eq_obj1id[k], m.eq_obj2id[k]
         if m.eq_objtype[k] == _SITE:
-            frames = [Placement(from_quaternion(*m.site_quat[i]), np.array(m.site_pos[i])) for i in ids]
+            frames = [by_quaternion(m.site_pos[i], m.site_quat[i]) for i in ids]
             if weld and data[6:10].any():
-                frames[0] = frames[0] @ Placement(from_quaternion(*data[6:10]), np.array(data[3:6]))
+                frames[0] = frames[0] @ by_quaternion(data[3:6], data[6:10])
             links = [bodies[m.site_bodyid[i]] for i in ids]
         else:
             links = [bodies[i] for i in ids]
             if not weld:
                 frames = [moved(data[:3]), moved(data[3:6])]
             else:  # the second body's anchor, and where it is and how it is turned as the first sees it
-                frames = [Placement(from_quaternion(*data[6:10]), np.array(data[3:6])), moved(data[:3])]
+                frames = [by_quaternion(data[3:6], data[6:10]), moved(data[:3])]
         return Loop(name, kind, (links[0], frames[0]), (links[1], frames[1]), place)
 
     def _tie(self, k: int, name: str, place: Place) -> Tie | None:

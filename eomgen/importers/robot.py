@@ -10,14 +10,17 @@ from typing import Any, TypedDict
 import numpy as np
 
 from ..base.files import as_name
+from ..base.limits.numbers import QUARTER
 from ..base.value_rules import CHECKS, word_of_check
-from ..elements.matrices import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
+from ..elements.scalars import cosine_and_sine, matrix_from_roll_pitch_yaw, skew
 from ..errors import Problem, ill_typed, no_choice, no_such
+from ..expr.records import Record
 from ..model.expressions import constant
 from ..model.names import nearest
 from .limits import LARGEST
 
 Place = tuple[str, int]  # file, line
+Numbers = np.ndarray | Sequence[float]
 Range = tuple[float, float]  # lowest and highest value
 Parts = tuple[tuple[str, float], ...]  # joints and their factors
 #: Suffix of a file that another program converts -> how.
@@ -177,8 +180,7 @@ def _names(raw: Any, key: str, also: str) -> tuple[str, ...]:
 
 
 # -- frames and inertias -----------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Placement:
+class Placement(Record):
     """A frame in another: ``rotation`` (3, 3) takes its axes to the other's, ``position`` (3,) is in those (m)."""
 
     rotation: np.ndarray
@@ -203,21 +205,56 @@ class Placement:
         if self.position.any():
             result["at"] = numbers(self.position)
         if not np.array_equal(self.rotation, np.eye(3)):
-            result["rpy"] = numbers(roll_pitch_yaw(self.rotation))
+            result["rpy"] = numbers(_roll_pitch_yaw(self.rotation))
         return result
+
+
+def _roll_pitch_yaw(R: np.ndarray) -> list[float]:
+    """Fixed-axis angles of a rotation matrix, good to rounding at any pitch.
+
+    The yaw is read first and the roll from what it leaves, so that an uncertain yaw near pitch = +-pi/2 does no harm
+    (the order of Eigen's Euler angles).
+    """
+    across = math.hypot(R[0, 0], R[1, 0])
+    yaw = math.atan2(R[1, 0], R[0, 0]) if across > 0 else 0.0
+    c, s = cosine_and_sine(yaw)
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return [roll, math.atan2(-R[2, 0], across), yaw]
 
 
 IDENTITY = Placement(np.eye(3), np.zeros(3))
 
 
-def numbers(values: np.ndarray | Numbers) -> list[float]:
+def numbers(values: Numbers) -> list[float]:
     """Plain floats; minus zero becomes zero."""
     return [float(x) + 0.0 for x in values]
 
 
-def moved(position: np.ndarray | Numbers) -> Placement:
+def moved(position: Numbers) -> Placement:
     """A frame that is moved only."""
     return Placement(np.eye(3), np.array(position, dtype=float))
+
+
+def turned(axis: Numbers, angle: float) -> Placement:
+    """A frame that is turned only, by an angle about a unit axis (Rodrigues' formula)."""
+    K: np.ndarray = np.array(skew(numbers(axis)))
+    c, s = cosine_and_sine(angle)
+    return Placement(np.eye(3) + s * K + (1 - c) * (K @ K), np.zeros(3))
+
+
+def by_quaternion(position: Numbers, quaternion: Numbers) -> Placement:
+    """A frame at a position, turned by a quaternion of any length, whose scalar comes first."""
+    w, x, y, z = quaternion
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    matrix = np.array(
+        [
+            [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
+        ]
+    )
+    nearest = np.round(matrix)
+    return Placement(nearest if np.abs(matrix - nearest).max() < QUARTER else matrix, np.array(position, dtype=float))
 
 
 def placed(position: Numbers, rpy: Numbers, snap: float) -> Placement:
@@ -225,11 +262,10 @@ def placed(position: Numbers, rpy: Numbers, snap: float) -> Placement:
 
     Angles within ``snap`` (rad) of a multiple of pi/2 are taken as that multiple, whose cosine and sine are exact.
     """
-    return Placement(from_roll_pitch_yaw(rpy, snap), np.array(position, dtype=float))
+    return Placement(np.array(matrix_from_roll_pitch_yaw(rpy, snap), dtype=float), np.array(position, dtype=float))
 
 
-@dataclass(frozen=True)
-class Inertia:
+class Inertia(Record):
     """Mass (kg), centre of mass (m) and inertia about it (kg m^2) in some frame."""
 
     mass: float
@@ -268,8 +304,7 @@ def sum_inertias(parts: Sequence[Inertia]) -> Inertia:
 
 
 # -- links, joints, loops and drives -----------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class RobotLink:
+class RobotLink(Record):
     """A link: its inertia in its own frame, and shapes to draw as (placement, data)."""
 
     name: str
@@ -278,8 +313,7 @@ class RobotLink:
     shapes: tuple[tuple[Placement, dict[str, Any]], ...] = ()
 
 
-@dataclass(frozen=True)
-class RobotJoint:
+class RobotJoint(Record):
     """A joint of the tree; ``outer`` is its frame on the parent, ``inner`` on the child.
 
     ``type`` is a word of eomgen's; the coordinate's law (damping, spring, drive's inertia) is that of a joint of one
@@ -305,16 +339,14 @@ class RobotJoint:
     clamp: Range | None = None  #: range of what all drives together do along it
 
 
-@dataclass(frozen=True)
-class Sum:
+class Sum(Record):
     """``constant`` + the sum of factors times joint coordinates."""
 
     parts: Parts
     constant: float = 0.0
 
 
-@dataclass(frozen=True)
-class Tie:
+class Tie(Record):
     """``left`` = a0 + a1 ``right`` + a2 ``right``^2 + ..., the a_k in ``law``; ``path`` is its place in the file."""
 
     name: str
@@ -325,8 +357,7 @@ class Tie:
     path: str = ""
 
 
-@dataclass(frozen=True)
-class Loop:
+class Loop(Record):
     """A joint that closes a loop; it has no coordinate of interest.  ``axis`` is the same in both frames."""
 
     name: str
@@ -337,8 +368,7 @@ class Loop:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
-@dataclass(frozen=True)
-class Drive:
+class Drive(Record):
     """A drive along L = sum c_j q_j: the force f = gain u + b0 + b1 L + b2 L' pushes c_j f along q_j.
 
     ``parts`` holds joints and their c_j; without a name there is no input u.  ``control`` and ``force`` are the ranges

@@ -12,7 +12,6 @@ import numpy as np
 from ..base.limits.numbers import SINGULAR
 from ..base.value_rules import EXCESS, fault_of_inertia, inertia_scales, longest_within
 from ..elements.joints import JOINTS
-from ..elements.matrices import about
 from ..elements.rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from ..errors import ModelError, Problem
 from ..model.description import GROUND_NAME, Description, Values
@@ -35,6 +34,7 @@ from .robot import (
     moved,
     numbers,
     sum_inertias,
+    turned,
 )
 
 GROUND = ""  #: the body that stands still
@@ -187,8 +187,7 @@ def _lock(robot: Robot, options: RobotOptions) -> None:
             robot.problem(path, f"is a {joint.type} joint", remedy, joint.place, "EG-REFERENCE")
         elif joint.type != "weld":
             axis = _unit(joint.axis)
-            turn = Placement(about(axis.tolist(), value), np.zeros(3))
-            motion = moved(value * axis) if joint.type == "prismatic" else turn
+            motion = moved(value * axis) if joint.type == "prismatic" else turned(axis, value)
             robot.joints[name] = replace(joint, type="weld", outer=joint.outer @ motion)  # what it mimics is held too
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import pipeline
 from ..elements.frames import GROUND, Frame, Marker
-from ..elements.matrices import from_quaternion
+from ..elements.rotations import matrix_from_euler_parameters, normalize_quaternion
 from ..errors import EomgenError, ToolchainError
 from ..expr import vectors as vec
 from ..expr.core import copied
@@ -138,7 +138,7 @@ def _turned(model: CheckedModel, seed: int) -> BoundModel:
     graph, size = mechanism.graph, SHIFT * float(model.module.info.length_scale or 1.0)
     places = {
         k: Frame(
-            vec.matrix(graph, from_quaternion(*random.normal(size=4)).tolist()),
+            vec.matrix(graph, matrix_from_euler_parameters(normalize_quaternion(random.normal(size=4))).tolist()),
             vec.vector(graph, (size * random.uniform(-1.0, 1.0, 3)).tolist()),
         )
         for k in range(len(mechanism.bodies))

@@ -13,14 +13,14 @@ import pytest
 import eomgen as eg
 from eomgen.base.value_rules import POSITIVE
 from eomgen.elements.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
-from eomgen.elements.dimensions import LENGTH, STIFFNESS
+from eomgen.elements.dimensions import LENGTH, NONE, STIFFNESS
 from eomgen.elements.element_type import element, key
 from eomgen.elements.forces import FORCES, View
 from eomgen.elements.forces.paths import LINE, PathForce
 from eomgen.elements.frames import Marker
 from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint, joint
 from eomgen.elements.kinds import MarkerReference, Scalar
-from eomgen.elements.looks import COIL, SPIRAL, JointLook, Seen, SymbolPart
+from eomgen.elements.looks import COIL, CROSS, SPIRAL, Drawn, JointLook, Seen, SymbolPart
 from eomgen.expr import vectors as vec
 from eomgen.expr.core import Expr, Graph
 from eomgen.expr.vectors import Mat3, Vec3
@@ -62,10 +62,9 @@ class Slanted(Joint):
 
     sentence: ClassVar[str] = "S slides on a slope of P."
     formula: ClassVar[str] = r"\mathbf{u} = q (\mathbf{e}_{z} + m \mathbf{e}_{x})"
-    type_name: ClassVar[str] = "slanted"
     look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.0, 2.0, 2.0)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
-    slope: Expr = key(Scalar("x for each z", required=True))
+    slope: Expr = key(Scalar("x for each z", required=True, dimension=NONE))
 
     def _along(self, graph: Graph) -> Vec3:
         return (self.slope, graph.zero, graph.one)
@@ -88,9 +87,11 @@ class Level(Constraint):
 
     sentence: ClassVar[str] = "The marker stays at the height $h$."
     formula: ClassVar[str] = r"z = h"
-    type_name: ClassVar[str] = "level"
     marker: Marker = key(MarkerReference("marker that stays at the height", required=True))
     height: Expr = key(Scalar("height (m)", default=0, dimension=LENGTH))
+
+    def drawn(self) -> list[Seen]:
+        return [Drawn((self.marker,), about=CROSS)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("height", view.position(self.marker)[2] - self.height, "length")]
@@ -114,6 +115,61 @@ def sprung() -> eg.Model:
     return m
 
 
+def slanting() -> eg.Model:
+    m = eg.Model("slope", gravity=(0, 0, -10))
+    m.slanted("s", m.ground, m.body("block", mass=1.0), slope="2*h")
+    m.parameter("h", 0.5)
+    return m
+
+
+def leveled() -> eg.Model:
+    m = eg.Model("level")
+    block = m.body("block", mass=1.0, inertia=(1, 1, 1))
+    m.translational("t", m.ground, block)
+    m.level("flat", block, height=0.25)
+    return m
+
+
+STUBS = {
+    "hardening_spring": "a: Any, b: Any, stiffness: Value, hardening: Value = 0, share: float = 100",
+    "slanted": "predecessor: Any, successor: Any, slope: Value",
+    "level": "marker: Any, height: Value = 0)",
+}
+
+
+@pytest.mark.parametrize(
+    ("model", "section", "entry", "kind", "measured", "doc", "sentence"),
+    [
+        (sprung, "forces", "k", "hardening_spring", "stiffness", "stiffness (N/m)", "hardens by the third power"),
+        (slanting, "joints", "s", "slanted", "slope", "x for each z", "S slides on a slope of P"),
+        (leveled, "constraints", "flat", "level", "height", "height (m)", "The marker stays at the height"),
+    ],
+)
+def test_all_follows_from_the_class(
+    model: Any, section: str, entry: str, kind: str, measured: str, doc: str, sentence: str, tmp_path: Path
+) -> None:
+    m = model()
+    method = getattr(m, kind)
+    assert f"{measured} : scalar" in method.__doc__
+    assert doc.lower() in method.__doc__.lower()
+    m.save(tmp_path / "m.yaml")
+    assert f"{entry}: {{type: {kind}, " in m.to_yaml() == eg.load(tmp_path / "m.yaml").to_yaml()
+    types = model_schema()["properties"][section]["additionalProperties"]["oneOf"]
+    (schema,) = (one["properties"] for one in types if one["properties"]["type"] == {"const": kind})
+    assert schema[measured]["description"] == doc
+    stub = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "stubs.py"))["element_stub"]()
+    assert f"def {kind}(self, name: str, {STUBS[kind]}" in " ".join(stub.split())
+    picture = m.compile(target="numpy").metadata["picture"]
+    seen = [one for one in (*picture["joints"], *picture["elements"]) if one["name"] == entry]
+    assert seen[0].get("pieces") or seen[0].get("along") or seen[0].get("about")
+    assert sentence in m.derive().explain().markdown
+    m.parameter("wide", 1.0, unit="m**2")
+    m.description.sections[section][-1].values[measured] = "wide"
+    with pytest.raises(eg.ModelError) as error:
+        m.check()
+    assert (f"{section}.{entry}.{measured}", "EG-DIMENSION") in [(x.path, x.code) for x in error.value.problems]
+
+
 def test_a_force_acts_by_its_law() -> None:
     mod = sprung().compile(target="numpy")
     s = 0.7
@@ -121,12 +177,11 @@ def test_a_force_acts_by_its_law() -> None:
     np.testing.assert_allclose(mod.energy([s, 0.0])[1], 0.5 * (2.5 * s**2 + 0.75 * s**4), rtol=1e-14)
 
 
-def test_its_method_file_schema_and_documentation_follow() -> None:
+def test_its_kind_of_key_is_described_everywhere() -> None:
     m = sprung()
     text = m.to_yaml()
     assert "k: {type: hardening_spring, between: [ground, block], stiffness: k, hardening: 3.0, share: 50}" in text
     assert "share : hundredths, optional" in m.hardening_spring.__doc__
-    assert "Add a spring that hardens." in m.hardening_spring.__doc__
     found = next(
         one for one in model_schema()["properties"]["forces"]["additionalProperties"]["oneOf"]
         if one["properties"]["type"] == {"const": "hardening_spring"}
@@ -135,8 +190,6 @@ def test_its_method_file_schema_and_documentation_follow() -> None:
         "type": "number", "minimum": 0, "default": 100, "description": "of both, what acts",
     }  # fmt: skip
     assert found["required"] == ["type", "between", "stiffness"]
-    assert "A spring that hardens by the third power" in m.derive().explain().markdown
-    assert m.draw() is not None
 
 
 @pytest.mark.parametrize(
@@ -157,36 +210,13 @@ def test_its_keys_are_judged_by_their_kinds(keys: dict[str, Any], code: str, pat
     assert (path, code) in [(problem.path, problem.code) for problem in error.value.problems]
 
 
-def test_type_checkers_know_all_of_them() -> None:
-    stub = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "stubs.py"))["element_stub"]()
-    ends = "self, name: str, a: Any, b: Any, stiffness: Value"
-    assert f"def hardening_spring({ends}, hardening: Value = 0, share: float = 100" in " ".join(stub.split())
-    assert "def slanted(self, name: str, predecessor: Any, successor: Any, slope: Value" in stub
-    assert "def level(self, name: str, marker: Any, height: Value = 0)" in stub
-
-
-def test_a_joint_moves_as_it_says_and_reads_its_key() -> None:
-    m = eg.Model("slope", gravity=(0, 0, -10))
-    block = m.body("block", mass=1.0)
-    joint = m.slanted("s", m.ground, block, slope="2*h")
-    m.parameter("h", 0.5)
-    assert "slope : scalar" in m.slanted.__doc__
-    mod = m.compile(target="numpy")
+def test_a_joint_moves_as_it_says() -> None:
+    mod = slanting().compile(target="numpy")
     np.testing.assert_allclose(mod.rhs(0.0, [0.0, 0.0])[1], -5.0, rtol=1e-14)  # g / (1 + slope^2)
-    assert joint.coordinate_names == ("s",)
-    assert "S slides on a slope of P" in m.derive().explain().markdown
-    assert m.draw() is not None
 
 
-def test_a_constraint_holds_what_it_says(tmp_path: Path) -> None:
-    m = eg.Model("level")
-    block = m.body("block", mass=1.0, inertia=(1, 1, 1))
-    m.translational("t", m.ground, block)
-    m.level("flat", block, height=0.25)
-    mod = m.compile(target="numpy")
+def test_a_constraint_holds_what_it_says() -> None:
+    mod = leveled().compile(target="numpy")
     x = mod.x0()
     np.testing.assert_allclose(x[2], 0.25, atol=1e-12)
     assert mod.rhs(0.0, x)[5] == pytest.approx(0.0, abs=1e-12)
-    assert "The marker stays at the height" in m.derive().explain().markdown
-    m.save(tmp_path / "level.yaml")
-    assert eg.load(tmp_path / "level.yaml").to_yaml() == m.to_yaml()
