@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 from ..base.limits.numbers import NOTHING, SINGULAR
 from ..expr import vectors as vec
 from ..expr.core import Expr
-from ..expr.records import dataclass
+from ..expr.records import Record
 
 Row = dict[int, Expr]  #: column -> entry; zeros left out
 Alike = TypeVar("Alike")
@@ -117,8 +117,7 @@ def minimum_degree(pattern: Sequence[Mapping[int, object]]) -> tuple[list[int], 
     return order, total
 
 
-@dataclass(frozen=True)
-class SparseFactor:
+class SparseFactor(Record):
     """P A P^T = L D L^T: ``columns[i]`` holds column i of L below its pivot, in the original indices."""
 
     order: tuple[int, ...]

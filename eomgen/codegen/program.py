@@ -14,7 +14,7 @@ from typing import Any
 
 from ..base.kernel_table import Sizes
 from ..expr.core import LEAVES, Expr, Graph, reachable
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.schedule import Operations
 from ..mechanics.methods.tree_equations import LinearSystem
 from .contact_columns import ContactColumns
@@ -64,8 +64,7 @@ def hoist(graph: Graph, roots: Sequence[Expr], parameters: Sequence[str]) -> tup
     return tuple(Expr(graph, i) for i in sorted(hoisted)), frozenset(inner)
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(Record):
     """Sizes at which the generated code changes its form; every field changes the sources."""
 
     #: trees whose mass matrix takes no more to factor than that of a chain of so many velocities get a straight-line
@@ -99,8 +98,7 @@ class Limits:
     repeated_dynamics: int = 40_000
 
 
-@dataclass(frozen=True)
-class Port:
+class Port(Record):
     """A named group of inputs of a function, in order."""
 
     name: str
@@ -124,8 +122,7 @@ class Signature:
         return {"x": self.n_in} if tuple(lengths) == ("q", "v") else lengths
 
 
-@dataclass(frozen=True)
-class Block(Signature):
+class Block(Record, Signature):
     """A straight-line function of the concatenated inputs of its ports."""
 
     name: str
@@ -154,8 +151,7 @@ class Block(Signature):
         return len(self.outputs)
 
 
-@dataclass(frozen=True)
-class KernelDriver(Signature):
+class KernelDriver(Record, Signature):
     """A public function that target code with loops and Newton iterations computes from blocks."""
 
     name: str
@@ -169,8 +165,7 @@ class KernelDriver(Signature):
         return prod(self.shape)
 
 
-@dataclass(frozen=True)
-class Program:
+class Program(Record):
     """Everything a target needs."""
 
     name: str  #: prefix of all public functions

@@ -18,7 +18,7 @@ from itertools import chain, groupby
 import numpy as np
 
 from ..expr.core import LEAVES, Graph, parts, reachable
-from ..expr.records import dataclass
+from ..expr.records import Record
 from .pair_sums import PairLists
 from .program import Block, Program
 from .statements import CIRCULAR
@@ -174,8 +174,7 @@ def _alternating(reader: SegmentReader, segments: Sequence[Segment], longest: in
     return [*result, *segments[done:]]
 
 
-@dataclass(frozen=True)
-class SegmentKind:
+class SegmentKind(Record):
     """Segments that are the same function of what they read."""
 
     members: tuple[tuple[int, ...], ...]  #: statements of every segment, in order of evaluation
@@ -185,8 +184,7 @@ class SegmentKind:
     start: int  #: where in the work array the blocks of the members begin
 
 
-@dataclass(frozen=True)
-class Segments:
+class Segments(Record):
     """All of a block."""
 
     kinds: tuple[SegmentKind, ...]

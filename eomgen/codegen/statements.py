@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from ..base.operations import CONDITION, operations_with
 from ..expr.core import LEAVES, Expr, Graph
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.schedule import chunk, order
 from .program import Block, Program
 
@@ -306,8 +306,7 @@ Slot = int | str  #: a place in an array, or the text of one
 FindPairs = Callable[[Sequence[int], Collection[int]], Pairs | None]
 
 
-@dataclass(frozen=True)
-class PrintedFunction:
+class PrintedFunction(Record):
     """A run of statements, printed as one function."""
 
     statements: tuple[int, ...]  #: node ids in order
@@ -318,8 +317,7 @@ class PrintedFunction:
     inlined: frozenset[int]  #: conditions that stand only in selections and checks, so need no variable
 
 
-@dataclass(frozen=True)
-class Pieces:
+class Pieces(Record):
     """All of a block: its pieces, results that need no statement, and the work slots used."""
 
     pieces: tuple[PrintedFunction, ...]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
 from typing import Any, Literal
@@ -12,7 +13,7 @@ from ..errors import cannot
 from ..expr.core import Expr, Graph, Node, reachable, substitute
 from ..expr.evaluate import Evaluator
 from ..expr.functions import Function
-from ..expr.records import dataclass
+from ..expr.records import Record
 from .pair_features import facing, nearest
 from .pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
 
@@ -22,8 +23,7 @@ from .pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
 PairPart = Literal["outputs", "slopes", "touch", "witness"]
 
 
-@dataclass(frozen=True)
-class PairKind:
+class PairKind(Record):
     """How two shapes act on each other.
 
     Attributes

@@ -18,7 +18,7 @@ from ..elements.frames import Frame, Marker
 from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.vectors import Vec3
 from .fields import field_lines
 from .pair_features import EDGE
@@ -79,8 +79,7 @@ class Feature(NamedTuple):
     number: int = 0
 
 
-@dataclass(frozen=True)
-class ContactShape:
+class ContactShape(Record):
     """A shape of a group, fixed to a marker.
 
     Attributes

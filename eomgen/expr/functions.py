@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import ModelError, Problem
-from .records import dataclass
+from .records import Record
 
 # -- values ------------------------------------------------------------------------------------------------------------
 
@@ -223,8 +224,7 @@ def up_to(arity: int, total: int) -> Iterator[Orders]:
 # of one argument, ``map(1,0)`` the derivative of ``map`` along its first.  The chain rule raises the orders.
 
 
-@dataclass(frozen=True)
-class NativeCode:
+class NativeCode(Record):
     """A function in C."""
 
     file: str  #: name of the source file, for messages

@@ -9,68 +9,50 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast, dataclass_transform
+from typing import Any, ClassVar, dataclass_transform
 
 #: Objects of a class after which its ``__init__`` is compiled.
 MANY = 100
-
-if TYPE_CHECKING:
-    from dataclasses import dataclass as dataclass
-else:
-
-    def dataclass(kind: type | None = None, /, **options: Any) -> Any:
-        """The standard library's ``dataclass``; ``dataclass(frozen=True)`` alone is what is made here."""
-        if kind is None and options == {"frozen": True}:
-            return _freeze
-        return dataclasses.dataclass(kind, **options)
 
 
 @dataclass_transform(frozen_default=True)
 class Record:
     """A class whose subclasses are frozen dataclasses, each with its own fields beside those of its bases."""
 
+    _field_names: ClassVar[tuple[str, ...]]
+
     def __init_subclass__(cls) -> None:
-        dataclass(frozen=True)(cls)
+        made: Any = dataclasses.dataclass(init=False, repr=False, eq=False)(cls)
+        fields = dataclasses.fields(made)
+        if not all(field.init and field.compare and field.hash is None for field in fields):
+            raise TypeError(f"a field of {cls.__qualname__} needs the standard library's dataclass")
+        cls._field_names = tuple(field.name for field in fields)
+        if "__init__" not in vars(cls):
+            made.__init__ = _Init(cls, fields)
 
+    def _values(self) -> tuple[Any, ...]:
+        return tuple([getattr(self, name) for name in self._field_names])
 
-def _freeze(kind: type) -> type:
-    made: Any = dataclasses.dataclass(init=False, repr=False, eq=False)(kind)
-    fields = dataclasses.fields(made)
-    if not all(field.init and field.compare and field.hash is None for field in fields):
-        raise TypeError(f"a field of {kind.__qualname__} needs the standard library's dataclass")
-    names = tuple(field.name for field in fields)
-    in_repr = tuple(field.name for field in fields if field.repr)
+    def __repr__(self) -> str:
+        fields: Any = dataclasses.fields(self)  # type: ignore[arg-type]
+        parts = (f"{field.name}={getattr(self, field.name)!r}" for field in fields if field.repr)
+        return f"{type(self).__qualname__}({', '.join(parts)})"
 
-    def values(record: Any) -> tuple[Any, ...]:
-        return tuple([getattr(record, name) for name in names])
+    def __eq__(self, other: object) -> bool:
+        return (
+            self._values() == other._values()
+            if isinstance(other, Record) and type(other) is type(self)
+            else NotImplemented
+        )
 
-    def __repr__(self: Any) -> str:
-        return f"{type(self).__qualname__}({', '.join(f'{name}={getattr(self, name)!r}' for name in in_repr)})"
+    def __hash__(self) -> int:
+        return hash(self._values())
 
-    def __eq__(self: Any, other: object) -> Any:
-        return values(self) == values(other) if type(other) is type(self) else NotImplemented
+    def __setattr__(self, name: str, value: object) -> None:
+        raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
 
-    def __hash__(self: Any) -> int:
-        return hash(values(self))
-
-    def __setattr__(self: Any, name: str, value: Any) -> None:
-        if type(self) is made or name in names:
-            raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
-        super(made, self).__setattr__(name, value)
-
-    def __delattr__(self: Any, name: str) -> None:
-        if type(self) is made or name in names:
-            raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
-        super(made, self).__delattr__(name)
-
-    members = vars(kind)
-    for method in (__repr__, __eq__, __hash__):
-        if members.get(method.__name__) is None:  # Python itself sets __hash__ to None beside an __eq__
-            setattr(made, method.__name__, method)
-    made.__setattr__, made.__delattr__ = __setattr__, __delattr__
-    if "__init__" not in members:
-        made.__init__ = _Init(made, fields)
-    return cast("type", made)
+    def __delattr__(self, name: str) -> None:
+        raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
 
 
 class _Init:

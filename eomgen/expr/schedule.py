@@ -11,13 +11,12 @@ from typing import Any
 from ..base.operations import ARITHMETIC, OPERATIONS, operations_with
 from ..errors import cannot
 from .core import LEAVES, Expr, Graph, common_graph, reachable
-from .records import dataclass
+from .records import Record
 
 # -- numbers of operations ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Operations:
+class Operations(Record):
     """How many operations evaluate some expressions, each shared node counted once."""
 
     multiplications: int = 0
@@ -71,8 +70,7 @@ def count(outputs: Sequence[Expr], skipped: Container[int] = ()) -> Operations:
 # -- order of evaluation -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Chunk:
+class Chunk(Record):
     """A run of statements, ids of nodes, that can stand in a function of its own."""
 
     statements: tuple[int, ...]  #: in order of evaluation

@@ -9,7 +9,7 @@ from ..elements.frames import Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute
 from ..expr.differentiate import jacobian, jvp
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.schedule import count
 from ..expr.spatial import add
 from ..expr.tensors import skew
@@ -31,8 +31,7 @@ SHORTER = 0.9
 COMMON = ("r_x", "r_y", "r_z")  #: rows along axes that both chains share (see close_loop)
 
 
-@dataclass(frozen=True)
-class ClosingGradients:
+class ClosingGradients(Record):
     """Equations and coordinates of a cut joint: labels, and dC = force . dr + moment . dtheta, P axes, at S.
 
     ``common`` tells that the rows of the place are along common axes, not along P's.

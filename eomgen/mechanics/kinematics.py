@@ -12,7 +12,7 @@ from ..errors import ModelError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph, substitute, symbols_of
 from ..expr.differentiate import jvp
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.spatial import Twist
 from ..expr.vectors import Vec3
 from ..model.mechanism import Mechanism
@@ -32,8 +32,7 @@ from .topology import MotionSymbols, Topology, find_topology, length_scale, moti
 from .tree import JointRates, Link, Poses, build_links, link_twists
 
 
-@dataclass(frozen=True)
-class LoopCoordinates:
+class LoopCoordinates(Record):
     """Coordinates y of cut joints, n_loop_coordinates, as functions of the tree: values, rates, accelerations, dy'/dv.
 
     Kinds are 'length', 'angle' (equal up to full turns), 'turn' (an angle that counts full turns) and 'parameter'.
@@ -47,8 +46,7 @@ class LoopCoordinates:
     jacobian: tuple[tuple[Expr, ...], ...] = ()
 
 
-@dataclass(frozen=True)
-class ForceTerms:
+class ForceTerms(Record):
     """One force element resolved: its loads, and its potential if it has one.
 
     The last two hold those of its loads that the potential does not account for; all loads where there is none.
@@ -62,7 +60,6 @@ class ForceTerms:
     coordinate_remainder: tuple[CoordinateLoad, ...]
 
 
-@dataclass(frozen=True)
 class Kinematics(MotionSymbols):
     """The tree, its motion, loop constraints and resolved forces, in (t, q, v, a), inputs and parameters."""
 

@@ -26,7 +26,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.evaluate import evaluate
 from ..expr.identity import random_point
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import subtract_matrices, symmetric
 from ..expr.vectors import Mat3, Rows, Vec3
@@ -215,7 +215,6 @@ def _entry(x: float, own: bool) -> float:
 # distances) instead.  For a planar chain these are absolute angles.
 
 
-@dataclass(frozen=True)
 class ResolvedLink(Link):
     """A link whose parent is resolved in other axes than its own: ``axes`` turns parent link axes to those."""
 
@@ -232,8 +231,7 @@ class ResolvedLink(Link):
         return turned.shifted(self.position)
 
 
-@dataclass(frozen=True)
-class Resolved:
+class Resolved(Record):
     """Links, their angular velocities and what goes with them, in the axes they are resolved in."""
 
     links: tuple[Link, ...]
@@ -328,8 +326,7 @@ def _hinge_angle(link: Link) -> Expr | None:
 # 535 operations so and 641 otherwise, those of quadrotor_load.yaml 569 and 724.
 
 
-@dataclass(frozen=True)
-class SlidingTriple:
+class SlidingTriple(Record):
     """Three velocities of a link: the first, link axes to the axes they are along, gravity in these if it falls."""
 
     link: int
@@ -338,8 +335,7 @@ class SlidingTriple:
     gravity: Vec3 | None
 
 
-@dataclass(frozen=True)
-class Turned:
+class Turned(Record):
     """M w' + h = 0 in turned velocities; ``form`` derives (M, h) when first used."""
 
     form: Callable[[], tuple[Rows, tuple[Expr, ...]]]

@@ -21,7 +21,7 @@ from ..expr.differentiate import gradient, jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.identity import random_point, vanishes
 from ..expr.notation import rate_of
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.vectors import Vec3
 from ..model.mechanism import JointSpec, Mechanism
 from .motion import MarkerMotion
@@ -31,8 +31,7 @@ from .tree import Poses, Turns
 # -- cut joints --------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Constraints:
+class Constraints(Record):
     """C(q, t) = 0 and its derivatives (Shabana, ch. 3): C' = C_q v + C_t, C'' = C_q a + gamma (Q_d = -gamma).
 
     C_q stands for the derivative of C' by v, dC/dq N where q' = N v.  Nonholonomic rows A(q, t) v + b(q, t) = 0
@@ -61,8 +60,7 @@ class Constraints:
         return len(self.labels) - len(self.values)
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(Record):
     """One equation ``expression = 0`` before its derivatives are formed.
 
     ``level`` is 'position' for C(q, t), 'velocity' for a nonholonomic A(q, t) v + b(q, t), linear in v.

@@ -18,7 +18,7 @@ from ..errors import TO_BE_FINITE, AssemblyError, ModelError, Problem
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import Evaluator
 from ..expr.identity import vanishes
-from ..expr.records import dataclass
+from ..expr.records import Record
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics
 from .loops import place_of
@@ -285,8 +285,7 @@ class Drivers:
 PROBES = 4  #: further assembled configurations at which the rank is judged
 
 
-@dataclass(frozen=True)
-class Mobility:
+class Mobility(Record):
     """What the numbers say about a mechanism; velocities are called by the coordinate whose rate they are, if any."""
 
     q_reference: tuple[float, ...]  #: assembled at the declared initial values

@@ -25,7 +25,7 @@ from ..errors import bad_file
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable, symbols_of
 from ..expr.identity import vanishes
-from ..expr.records import dataclass
+from ..expr.records import Record
 from .constraint_functions import Array, ConstraintFunctions
 from .kinematics import Kinematics, parts_of
 from .mobility import Mobility, initial_values
@@ -225,8 +225,7 @@ ASSUMED = "some parameters have no value; random values were used to find the ra
 LISTED = 12  #: names in one of them
 
 
-@dataclass(frozen=True)
-class MechanismReport:
+class MechanismReport(Record):
     """Counts, topology and mobility of a mechanism.
 
     Attributes

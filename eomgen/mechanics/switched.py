@@ -16,7 +16,6 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
 from ..expr.differentiate import jacobian
 from ..expr.identity import vanishes
-from ..expr.records import dataclass
 from ..model.mechanism import Switched
 from .kinematics import ForceTerms, Kinematics
 from .loops import couple, differentiate_constraints, refuse_rows_of_time, refuse_unusable
@@ -40,7 +39,6 @@ class SwitchedRow(NamedTuple):
     kind: str  #: 'length' or 'angle'
 
 
-@dataclass(frozen=True)
 class ClosingForce(Force):
     """What a constraint exerts while it is closed."""
 

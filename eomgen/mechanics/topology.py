@@ -26,7 +26,7 @@ from ..expr.core import Expr
 from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import Evaluator
 from ..expr.identity import rounded_vector, size_of
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.vectors import Vec3
 from ..model.checks import UNHELD
 from ..model.equations import clock
@@ -37,8 +37,7 @@ from ..model.mechanism import JointSpec, Mechanism
 LONG = 32
 
 
-@dataclass(frozen=True)
-class Branch:
+class Branch(Record):
     """One tree joint: ``body`` hangs on ``parent`` (indices of bodies, GROUND) through joint number ``joint``."""
 
     body: int
@@ -47,8 +46,7 @@ class Branch:
     reversed: bool  #: the tree passes the joint from successor to predecessor
 
 
-@dataclass(frozen=True)
-class Topology:
+class Topology(Record):
     """The spanning tree in an order where parents come first, and the cut joints in order of declaration."""
 
     branches: tuple[Branch, ...]
@@ -211,8 +209,7 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
 # -- layout of coordinates ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class MotionSymbols:
+class MotionSymbols(Record):
     """Coordinates, velocities, accelerations of the tree and time: names, kinds, symbols, and q' in terms of them.
 
     ``q`` are the coordinates in the order of ``names``; ``v`` and ``a`` the generalized velocities and their rates, in

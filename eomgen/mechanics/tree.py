@@ -13,7 +13,7 @@ from ..expr.core import Expr, Graph, atan2, substitute, symbols_of
 from ..expr.differentiate import gradient
 from ..expr.evaluate import evaluate
 from ..expr.identity import DRAWS, random_point, rounded_rotation, rounded_vector, size_of, vanishes
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, rotate_symmetric, symmetric
 from ..expr.vectors import Mat3, Vec3
@@ -57,8 +57,7 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> Turns | Non
 # Written so that few operations are left: a turn about a coordinate axis touches only what it changes.
 
 
-@dataclass(frozen=True)
-class SpatialInertia:
+class SpatialInertia(Record):
     """Mass, first moment m c and inertia about the link's origin, in link axes (Featherstone, RBDA, eq. 2.62)."""
 
     mass: Expr
@@ -138,8 +137,7 @@ def rounded_matrix(turned: Mat3, before: Mat3) -> Mat3:
 # in link axes at the link's origin (Featherstone, RBDA, ch. 2, with body coordinates).
 
 
-@dataclass(frozen=True)
-class Link:
+class Link(Record):
     """One body of the tree.
 
     A vector in parent link axes goes to link axes by ``joint_rotation^T turn^T``; the link's origin is at ``position``
@@ -258,8 +256,7 @@ def _reverse(rotation: Mat3, position: Vec3, column: Twist) -> Twist:
     return vec.neg(angular), vec.sub(vec.cross(angular, position), linear)
 
 
-@dataclass(frozen=True)
-class JointRates:
+class JointRates(Record):
     """Motion of one link relative to its parent."""
 
     spin: Vec3  #: relative angular velocity sum s v, link axes

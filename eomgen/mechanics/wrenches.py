@@ -18,7 +18,7 @@ from ..elements.frames import GROUND, Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.differentiate import jacobian, vjp
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.spatial import Twist, Wrench
 from ..expr.tensors import add_matrices, shift_tensor, symmetric
 from ..expr.vectors import Vec3
@@ -140,8 +140,7 @@ def mass_parents(kinematics: Kinematics) -> tuple[int, ...]:
 Row6 = tuple[Expr, ...]  # force, moment
 
 
-@dataclass(frozen=True)
-class CutJoint:
+class CutJoint(Record):
     """A cut joint: by how much its equations and coordinates change when S moves against P, about S, ground axes."""
 
     spec: JointSpec

@@ -16,7 +16,7 @@ from ..elements.joints import DATA, JOINTS, Joint
 from ..elements.kinds import Scalar
 from ..errors import ModelError
 from ..expr.core import symbols_of
-from ..expr.records import dataclass
+from ..expr.records import Record
 from .checks import check_keys, check_names
 from .description import DescribedEntry, Description, items
 from .mechanism import STATE_RATE, FirstOrderState, JointSpec
@@ -56,8 +56,7 @@ def _lock_of(entry: DescribedEntry) -> tuple[DescribedEntry | None, DescribedEnt
     return replace(entry, values=rest), replace(entry, values={"type": "lock", "joint": entry.name, **own})
 
 
-@dataclass(frozen=True)
-class Declared:
+class Declared(Record):
     """A joint whose type and coordinates are known, before its markers and expressions are looked up."""
 
     entry: Entry

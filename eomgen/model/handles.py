@@ -9,7 +9,7 @@ from ..base import texts
 from ..elements.joints import JOINTS
 from ..elements.kinds import Fields
 from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.texts import shown
 from .build_elements import coordinate_names, sketch
 from .description import GROUND_NAME, DescribedEntry, Description, as_written, is_zero, items, label_of
@@ -189,8 +189,7 @@ class Motion:
     angular_acceleration = _vector("w", "_dot", "Angular acceleration of the body (rad/s^2), for outputs.")
 
 
-@dataclass(frozen=True)
-class SeenMotion(Motion):
+class SeenMotion(Record, Motion):
     """The motion of a marker as seen from another, in the axes of a third, as SymPy symbols (SI units).
 
     ``origin`` and ``axes`` are labels of markers, empty for ground.

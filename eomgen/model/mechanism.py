@@ -21,7 +21,7 @@ from ..elements.frames import Frame, Marker
 from ..elements.kinds import Field
 from ..errors import ModelError, Problem
 from ..expr.core import LEAVES, Expr, Graph, reachable
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.vectors import Mat3, Vec3
 from .description import as_written, place_of
 from .placement import TURNS, Columns
@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from ..elements.joints import Joint
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(Record):
     """A constant of the model that can change between runs without recompiling."""
 
     name: str
@@ -44,8 +43,7 @@ class Parameter:
     doc: str = ""
 
 
-@dataclass(frozen=True)
-class Input:
+class Input(Record):
     """A quantity given from outside over time."""
 
     name: str
@@ -55,8 +53,7 @@ class Input:
     signal: Expr | None = None  #: of runs that give none
 
 
-@dataclass(frozen=True)
-class Body:
+class Body(Record):
     """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes.
 
     ``moment`` (m c, kg m) and ``inertia_origin`` (about the body's origin) are there where the user gave them, so that
@@ -74,8 +71,7 @@ class Body:
     about: Vec3 | None = None  #: the point that the inertia was given about, if not the centre of mass
 
 
-@dataclass(frozen=True)
-class JointSpec:
+class JointSpec(Record):
     """A joint between two markers; ``joint`` answers what its type means, ``coordinates`` are the full names.
 
     ``predecessor`` and ``successor`` already include the turn that brings the joint's axis to their z; ``axes`` are the
@@ -119,8 +115,7 @@ class BodyShape(NamedTuple):
     color: str = ""  #: #rrggbb; the body's own where there is none
 
 
-@dataclass(frozen=True)
-class Output:
+class Output(Record):
     """A named result: an expression in t, coordinates, their rates, parameters, inputs and marker quantities."""
 
     name: str
@@ -133,8 +128,7 @@ class Output:
 STATE_RATE = "state "  #: begins the quantity of an element that is the rate of its state of a number
 
 
-@dataclass(frozen=True)
-class FirstOrderState:
+class FirstOrderState(Record):
     """A first-order state s with s' = rate, beside the coordinates and velocities of the mechanism.
 
     One that is sampled is held between the times of its clock, where it becomes the value of ``sampled``.
@@ -147,8 +141,7 @@ class FirstOrderState:
     sampled: Expr | None = None
 
 
-@dataclass(frozen=True)
-class Clock:
+class Clock(Record):
     """The sampling times offset + k period, k = 0, 1, .., of states that are sampled together.
 
     The state ``counter`` holds the k of the next time; ``event`` happens there.
@@ -161,8 +154,7 @@ class Clock:
     offset: Expr
 
 
-@dataclass(frozen=True)
-class Lagrangian:
+class Lagrangian(Record):
     """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0.
 
     A constraint that contains velocities is linear in them.
@@ -175,8 +167,7 @@ class Lagrangian:
     constraints: tuple[Expr, ...]
 
 
-@dataclass(frozen=True)
-class GivenEquations:
+class GivenEquations(Record):
     """Equations of motion as they are given: M v' + C_q^T l = f with q' = N(q, t) v + b(q, t) and constraints C = 0.
 
     M is of q and t, f of q, v and t; a constraint that contains velocities is linear in them.  ``multipliers`` names
@@ -194,8 +185,7 @@ class GivenEquations:
     potential_energy: Expr
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(Record):
     """A zero of an expression, and what happens there."""
 
     name: str
@@ -234,8 +224,7 @@ class Switched(NamedTuple):
         return FirstOrderState(self.state, self.stabilisation.graph.zero, doc=f"1 while {name} holds")
 
 
-@dataclass(frozen=True)
-class Simulation:
+class Simulation(Record):
     """Defaults of ``simulate`` and ``eomgen run``."""
 
     end: float = 10.0
@@ -245,8 +234,7 @@ class Simulation:
     step: float | None = None
 
 
-@dataclass(frozen=True)
-class RunDefaults:
+class RunDefaults(Record):
     """Where a run starts and how it is made where a call does not say so."""
 
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate, ``<coordinate>_dot`` or state
@@ -256,8 +244,7 @@ class RunDefaults:
     limits_told: bool = True  #: whether runs that pass a limit of a joint say so
 
 
-@dataclass(frozen=True)
-class Presentation:
+class Presentation(Record):
     """What documents and pictures show of a mechanism; nothing is computed from it."""
 
     doc: str = ""
@@ -270,8 +257,7 @@ class Presentation:
     added_bodies: tuple[int, ...] = ()  #: that no one described: points of contact of cams
 
 
-@dataclass(frozen=True)
-class Mechanism:
+class Mechanism(Record):
     """What the user said, checked and lowered to one graph: its physics, defaults of runs, and what is shown of it."""
 
     name: str

@@ -14,7 +14,7 @@ from ..elements import dimensions
 from ..elements.dimensions import Dimension
 from ..elements.frames import Marker
 from ..errors import ExpressionError
-from ..expr.records import dataclass
+from ..expr.records import Record
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
 SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
@@ -84,8 +84,7 @@ def dimension_of(level: int, axis: int) -> Dimension:
 
 
 # -- of the markers of a mechanism -----------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(Record):
     """Motion of a marker: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2, or 3 for its angle about
     the z axis of the origin, 4 for its distance from the origin.
 

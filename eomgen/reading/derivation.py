@@ -15,7 +15,7 @@ import numpy as np
 from ..base.texts import fold, shown
 from ..errors import AssemblyError, cannot, ill_typed, off_range
 from ..expr.core import Expr, copied
-from ..expr.records import dataclass
+from ..expr.records import Record
 from ..expr.schedule import Operations, count
 from ..expr.without_gc import timed, without_gc
 from ..mechanics import Kinematics, analyse
@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
-@dataclass(frozen=True)
-class Derivation(Displayed):
+class Derivation(Record, Displayed):
     """What a derivation gives; :class:`~..api.equations.Equations` says what its attributes are."""
 
     kinematics: Kinematics = field(repr=False)

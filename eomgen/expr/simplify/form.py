@@ -15,7 +15,7 @@ from typing import Any
 
 from ...base.operations import CONDITION, operations_with
 from ..core import LEAVES, Expr, Graph, common_graph, operands, reachable
-from ..records import dataclass
+from ..records import Record
 from .atoms import ONE, TURNS, Frozen, Poly, TooLongError, Work, freeze, scaled
 from .expansion import Expansion
 from .factoring import Factoring, Literal, Mixed, Parts, with_signs, without_exact_quotients
@@ -31,8 +31,7 @@ WORSE = 1.15  #: how much longer an attempt is after which none with fewer names
 SHARED = 1.35  #: how much longer what needs no names may be
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(Record):
     """Polynomials in atoms, in which names stand for others."""
 
     graph: Graph

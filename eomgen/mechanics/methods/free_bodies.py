@@ -12,7 +12,7 @@ from ...elements.frames import GROUND, Frame
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import hessian, jacobian, jvp
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...expr.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
 from ...expr.tensors import combined, skew, solve_symmetric
 from ...expr.vectors import Rows
@@ -121,8 +121,7 @@ class FreeBodies:
         return [i for i, label in enumerate(c.labels) if label in self.kinematics.coupled]
 
 
-@dataclass(frozen=True)
-class FreeBodyCut:
+class FreeBodyCut(Record):
     """A cut joint between two bodies: rows W of C' = W V with V the twist of S relative to P, in S axes at S."""
 
     outer: int  #: link of the predecessor, GROUND for ground

@@ -12,7 +12,7 @@ from ...base.limits.constraints import UNMOVED
 from ...base.limits.numbers import EPS, LEAST, NOTHING, SINGULAR, TINY, WORTH_A_WORD
 from ...errors import EvaluationError, ModelError, PartitionError, Problem
 from ...expr.evaluate import Evaluator, evaluate
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...model.mechanism import Mechanism
 from .. import Kinematics
 from ..constraint_functions import ConstraintFunctions
@@ -25,8 +25,7 @@ from .tree_equations import TreeEquations
 FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of a message
 
 
-@dataclass(frozen=True)
-class MasslessMotion:
+class MasslessMotion(Record):
     """Velocities v (n,), in the order of the freedoms, that move no mass at a configuration q (n_q,)."""
 
     q: np.ndarray

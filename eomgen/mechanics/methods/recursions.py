@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ...elements.frames import GROUND
 from ...expr import vectors as vec
 from ...expr.core import Expr, Graph
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...expr.spatial import Twist, Wrench, add, dot, scaled
 from ...expr.tensors import add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ...expr.vectors import Mat3, Rows
@@ -74,8 +74,7 @@ def composite_mass_matrix(links: Sequence[Link], inertias: Sequence[SpatialInert
 # (2011), ch. 11).
 
 
-@dataclass(frozen=True)
-class Articulated:
+class Articulated(Record):
     """[moment; force] = [[inertia, coupling], [coupling^T, mass]] [angular; linear acceleration] + a wrench."""
 
     inertia: Mat3
@@ -147,8 +146,7 @@ class Articulated:
         return Articulated(symmetric(_matrix(rows)), moved, mass)
 
 
-@dataclass(frozen=True)
-class Release:
+class Release(Record):
     """One released column: U = I s, D = s . U, and the force left to accelerate it."""
 
     index: int
@@ -160,8 +158,7 @@ class Release:
     rows: Mapping[int, Expr]  #: g_i = s . K_i + c_i of the constraints carried: their multipliers push along the column
 
 
-@dataclass(frozen=True)
-class Multiplier:
+class Multiplier(Record):
     """A multiplier taken out: l = (K . a + r - sum G_j l_j) / G."""
 
     row: int
@@ -171,8 +168,7 @@ class Multiplier:
     others: Mapping[int, Expr]
 
 
-@dataclass(frozen=True)
-class ConstraintRow:
+class ConstraintRow(Record):
     """c . v' + rest = 0, entries by the index of the velocity."""
 
     entries: Mapping[int, Expr]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from types import FunctionType
 
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import jacobian
-from ...expr.records import dataclass
+from ...expr.records import Record
 from ...expr.tensors import combined
 from ...expr.vectors import Rows
 from ...model.equations import momenta_and_rates
@@ -21,8 +21,7 @@ from .recursions import TreeMotion
 # -- what a method delivers --------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class LinearSystem:
+class LinearSystem(Record):
     """K z = r, whose solution holds the accelerations: what the forms solve that keep reactions as unknowns.
 
     Attributes
