@@ -444,10 +444,7 @@ class _Writer:
                 markers[marker] = {"at": [0, 0, 0], **frame.placed()}
                 self.markers[link.name] = f"{name}.{marker}"
             display += [{**shape, **(frame @ at).placed()} for at, shape in link.shapes]
-        if markers:
-            values["markers"] = markers
-        if display:
-            values["display"] = display
+        values |= {key: x for key, x in (("markers", markers), ("display", display)) if x}
         if values:
             place = body.members[0][0].place if body.members else (self.robot.file, 1)
             self._add("bodies", name, values, place)
@@ -500,12 +497,9 @@ class _Writer:
         values |= self._turning(joint.type)
         if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
             values |= {"coordinate": names[0]} if single else {"coordinates": names}
-        if joint.limits:
-            values["limits"] = dict(joint.limits)
-        if joint.dry_friction:
-            values["dry_friction"] = joint.dry_friction
-        if joint.armature and single:
-            values["armature"] = joint.armature
+        data = {"limits": dict(joint.limits), "dry_friction": joint.dry_friction}
+        data |= {"armature": joint.armature} if single else {}
+        values |= {key: x for key, x in data.items() if x}
         self._add("joints", name, values, joint.place)
         if joint.armature and not single:
             self._rotor(joint)

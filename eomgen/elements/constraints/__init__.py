@@ -2,9 +2,8 @@
 
 from ..element_type import Types
 from . import cams, constraint, drivers, gears, rolling, switching
-from .constraint import Condition, Constraint, ConstraintView, Equation, Linear
+from .constraint import Condition, Constraint, ConstraintView, Equation
 from .drivers import CoordinateDriver, Driver
-from .gears import Gear, Planetary
 from .rolling import RollingDisc
 from .switching import switchable
 
@@ -20,8 +19,5 @@ __all__ = [
     "CoordinateDriver",
     "Driver",
     "Equation",
-    "Gear",
-    "Linear",
-    "Planetary",
     "RollingDisc",
 ]

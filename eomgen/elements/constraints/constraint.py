@@ -154,12 +154,8 @@ def _equation(e: Entry) -> Equation | None:
             what = {"marker": "acceleration", "rate of rate": "second rate"}.get(meant.kind, meant.kind)
             e.fault("equation", f"the {what} {name!r} cannot be used here", ALLOWED, "EG-REFERENCE")
         elif meant.kind in _UNUSABLE:
-            e.fault(
-                "equation",
-                f"the {meant.kind} {name!r} cannot be used here",
-                f"{ALLOWED}, {_UNUSABLE[meant.kind]}",
-                "EG-REFERENCE",
-            )
+            remedy = f"{ALLOWED}, {_UNUSABLE[meant.kind]}"
+            e.fault("equation", f"the {meant.kind} {name!r} cannot be used here", remedy, "EG-REFERENCE")
     moving = [meant for meant in used.values() if meant.level is not None]
     rates = [name for name, meant in used.items() if meant.level == 1]
     if not moving and not e.at_fault("equation"):

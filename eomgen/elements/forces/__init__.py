@@ -3,11 +3,8 @@
 from ..element_type import Types
 from . import friction, muscle, normal_laws, springs, wheels
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View
-from .friction import Friction, LuGre, ReactionFriction
-from .muscle import Muscle
-from .paths import JointCoordinate, Line, Path, Route, Turn
-from .springs import Actuator, Bushing, Damper, Spring
-from .wheels import Tyre
+from .friction import ReactionFriction
+from .paths import JointCoordinate, Line, Route, Turn
 
 FORCES: Types = {}
 for _home in (springs, friction, normal_laws, muscle, wheels):
@@ -15,23 +12,14 @@ for _home in (springs, friction, normal_laws, muscle, wheels):
 
 __all__ = [
     "FORCES",
-    "Actuator",
-    "Bushing",
     "CoordinateLoad",
-    "Damper",
     "Force",
-    "Friction",
     "JointCoordinate",
     "Line",
     "Load",
-    "LuGre",
     "MarkerLoad",
-    "Muscle",
-    "Path",
     "ReactionFriction",
     "Route",
-    "Spring",
     "Turn",
-    "Tyre",
     "View",
 ]

@@ -141,9 +141,6 @@ TYPES = table(
 )
 
 
-# -- tyres on a road ---------------------------------------------------------------------------------------------------
-
-
 # -- laws of tyres -----------------------------------------------------------------------------------------------------
 
 # Slips have the sign of the motion of the tread over the road: forces oppose them. A tyre rolls backwards as its mirror
