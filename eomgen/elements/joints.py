@@ -89,8 +89,8 @@ BETWEEN = kinds.Pair(
 )
 AXIS = kinds.Axis("axis of the joint, in both markers", default="z")
 AXIS_PAIR = kinds.TwoAxes("axes of the cross in the markers: the first stays with P, the second with S")
-COORDINATE = kinds.CoordinateName("name of the coordinate (the joint's name unless given)")
-COORDINATES = kinds.CoordinateNames("names of the coordinates, in order")
+COORDINATE = kinds.Name("name of the coordinate (the joint's name unless given)", holds="coordinate")
+COORDINATES = kinds.Names("names of the coordinates, in order", holds="coordinate")
 LATEX = kinds.Latexes("how formulas and plots print its coordinates, in LaTeX: a text, a list or a mapping", default=())
 #: Data of a joint that has coordinates; the last only where it has one.
 DATA: Fields = {

@@ -109,7 +109,7 @@ class Field:
     annotation: ClassVar[str] = "Value"
     schema: ClassVar[Schema] = {}
     defines: ClassVar[Mapping[str, Schema | Callable[[], Schema]]] = {}  #: what the schema refers to
-    holds: ClassVar[str] = ""  #: what a visitor changes of it: vector, marker, latex, or the names coordinate, body
+    holds: str = ""  #: what a visitor changes of it: vector, marker, latex, or the names coordinate, body
     joins: ClassVar[bool] = False  #: whether the method has an argument for each of its two ends
     parts: ClassVar[Fields] = {}  #: keys within it
 
@@ -129,10 +129,12 @@ class Field:
         allowed: Allowed | None = None,
         remedy: str = "",
         measure: str = "",
+        holds: str = "",
     ) -> None:
         self.doc, self.required, self.default, self.level, self.choices = doc, required, default, level, choices
         self.own, self.not_zero, self.dimension, self.along, self.exponent = own, not_zero, dimension, along, exponent
         self.local, self.allowed, self.remedy, self.measure = local or {}, allowed, remedy, measure
+        self.holds = holds or self.holds
 
     def __init_subclass__(cls) -> None:
         first, _, rest = (cls.__doc__ or "").partition("\n")[0].removesuffix(".").partition(" ")
@@ -253,23 +255,11 @@ class Name(Field):
     schema, defines = define("name", {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST})
 
 
-class CoordinateName(Name):
-    """The name that an entry gives to a coordinate."""
-
-    says, holds = Name.says, "coordinate"
-
-
 class Names(Field):
     """A list of names."""
 
     argument, annotation = "sequence of str", "Sequence[Any]"
     schema = array(ref("name"))
-
-
-class CoordinateNames(Names):
-    """The names that an entry gives to coordinates or velocities."""
-
-    says, holds = Names.says, "coordinate"
 
 
 class SomeNames(Field):

@@ -207,7 +207,7 @@ BODY: Fields = {
 GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 
 LAGRANGIAN: Fields = {
-    "coordinates": k.CoordinateNames("generalized coordinates, in order", required=True),
+    "coordinates": k.Names("generalized coordinates, in order", required=True, holds="coordinate"),
     "expression": k.Scalar("L(q, q_dot, t) = T - V", required=True, level=k.MOTION, dimension=ENERGY),
     "forces": k.CoordinateForces("generalized forces", default=(), level=k.MOTION),
     "dissipation": k.Scalar(
@@ -219,8 +219,8 @@ LAGRANGIAN: Fields = {
     "latex": LATEX,
 }
 EQUATIONS: Fields = {
-    "coordinates": k.CoordinateNames("generalized coordinates q, in order", required=True),
-    "velocities": k.CoordinateNames("generalized velocities v, in order (<coordinate>_dot unless given)"),
+    "coordinates": k.Names("generalized coordinates q, in order", required=True, holds="coordinate"),
+    "velocities": k.Names("generalized velocities v, in order (<coordinate>_dot unless given)", holds="coordinate"),
     "rates": k.Rates("q' of q, v, t, linear in v (q' = v unless given)", level=k.MOTION),
     "intermediates": k.Rates("named parts of the expressions; each may use those before", level=k.MOTION),
     "mass_matrix": k.Matrix("M in M v' = f, of q and t, symmetric", required=True, level=k.MOTION),

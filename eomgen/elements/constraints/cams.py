@@ -16,7 +16,7 @@ from ...expr.records import Record
 from ..dimensions import LENGTH, NONE, REACH
 from ..element_type import ElementType, Entry, table
 from ..frames import Frame, Marker
-from ..kinds import Choice, CoordinateName, Flag, JointReference, Latex, MarkerReference, Scalar
+from ..kinds import Choice, Flag, JointReference, Latex, MarkerReference, Name, Scalar
 from ..looks import Contour, LiftCurve, Seen, Wheel
 from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 
@@ -351,7 +351,7 @@ TYPES = table(
                 local=_TURN,
             ),
             "radius": Scalar("radius of the roller (m)", dimension=LENGTH, allowed=POSITIVE),
-            "coordinate": CoordinateName("name of the polar angle of the contact point (<name>_contact)"),
+            "coordinate": Name("name of the polar angle of the contact point (<name>_contact)", holds="coordinate"),
             "latex": Latex("how formulas and plots print that angle, in LaTeX (from its name unless given)"),
             "periodic": _PERIODIC,
         },
