@@ -502,20 +502,13 @@ def _independent_rows(forms: Forms, constants: Sequence[str], functions: Sequenc
             break
     else:
         return list(range(len(motion))), False
-    basis = np.empty((0, len(v)))
-    fresh: list[bool] = []
-    for row, noise in zip(matrix, rounding, strict=True):
-        length = np.linalg.norm(row)
-        left = row - basis.T @ (basis @ row)
-        left -= basis.T @ (basis @ left)
-        size = np.linalg.norm(left)
-        fresh.append(bool(size > SMALL * length and size > np.linalg.norm(noise)))
-        if fresh[-1]:
-            basis = np.vstack([basis, left / size])
-    h = len(configuration)
-    own = [k for k, new in enumerate(fresh) if new]
-    for k in [k for k, new in enumerate(fresh) if not new]:
-        factors = algebra.lstsq(matrix[own].T, matrix[k], rcond=None)
+    h, own = len(configuration), list[int]()
+    for k, row in enumerate(matrix):
+        factors = algebra.lstsq(matrix[own].T, row, rcond=None) if own else np.empty(0)
+        size = np.linalg.norm(row - factors @ matrix[own])
+        if size > SMALL * np.linalg.norm(row) and size > np.linalg.norm(rounding[k]):
+            own.append(k)
+            continue
         largest = max(1.0, float(abs(right[k])), float(np.abs(factors).max(initial=0)))
         if abs(right[k] - factors @ right[own]) > SMALL * largest:
             which = f"configuration constraint {k + 1}" if k < h else f"velocity constraint {k - h + 1}"
@@ -524,4 +517,4 @@ def _independent_rows(forms: Forms, constants: Sequence[str], functions: Sequenc
                 "remaining terms"
             )
             raise ModelError([Problem("equations.constraints", message, f"check the {which}", code="EG-REDUNDANT")])
-    return [k for k in range(len(motion)) if fresh[h + k]], all(fresh[:h])
+    return [k - h for k in own if k >= h], own[:h] == [*range(h)]
