@@ -213,26 +213,25 @@ def ellipsoid_support(local: Vec3, semi_axes: Vec3) -> Expr:
 # -- entries -----------------------------------------------------------------------------------------------------------
 
 
-#: Key -> the shapes that have it.
-_OWN = {
-    "radius": ("disc", "sphere"),
-    "tube": ("disc",),
-    "no_spin": ("sphere",),
-    "semi_axes": ("ellipsoid",),
-    "support": ("convex",),
+#: Shape -> what several are called, the key that it needs, and another that it has.
+_SHAPES = {
+    "disc": ("discs", "radius", "tube"),
+    "sphere": ("spheres", "radius", "no_spin"),
+    "ellipsoid": ("ellipsoids", "semi_axes"),
+    "convex": ("convex shapes", "support"),
 }
-_NAMES = {"disc": "discs", "sphere": "spheres", "ellipsoid": "ellipsoids", "convex": "convex shapes"}
-_NEEDED = {"disc": "radius", "sphere": "radius", "ellipsoid": "semi_axes", "convex": "support"}
 
 
 def _rolling(e: Entry) -> Constraint | None:
     shape, wheel, plane = e["shape"], e["wheel"], e["plane"]
-    for own, shapes in _OWN.items():
-        if shape in _NEEDED and shape not in shapes:
-            e.refuse(own, f"only {' and '.join(_NAMES[one] for one in shapes)} have it")
-    needed = _NEEDED.get(shape)
-    if needed is not None and needed not in e.values:
-        e.missing(needed, f"needed where shape is {shape}")
+    if shape in _SHAPES:
+        for own in dict.fromkeys(key for _, *keys in _SHAPES.values() for key in keys):
+            if own not in _SHAPES[shape]:
+                e.refuse(
+                    own, f"only {' and '.join(plural for plural, *keys in _SHAPES.values() if own in keys)} have it"
+                )
+        if (needed := _SHAPES[shape][1]) not in e.values:
+            e.missing(needed, f"needed where shape is {shape}")
     if wheel is None or plane is None or e.at_fault() or not on_two_bodies(e, "plane", wheel, plane):
         return None
     if shape == "sphere":
@@ -265,7 +264,7 @@ TYPES = table(
                 "marker in the plane; z is its normal and points to the wheel's side", default="ground"
             ),
             "radius": Scalar("radius of a disc or a sphere (m)", dimension=LENGTH, allowed=POSITIVE),
-            "shape": Choice("shape of the wheel", default="disc", choices=tuple(_NEEDED)),
+            "shape": Choice("shape of the wheel", default="disc", choices=tuple(_SHAPES)),
             "tube": Scalar("radius of the rounded edge of a disc (m), 0 for a sharp edge", default=0, dimension=LENGTH),
             "no_spin": Flag("whether the sphere is kept from spinning about the plane's normal", default=False),
             "semi_axes": Vector("semi-axes of an ellipsoid along x, y and z (m)", dimension=LENGTH),

@@ -70,10 +70,6 @@ class Actuator(PathForce):
         return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
 
 
-def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
-    return vec.times(view.rotation(marker), value) if axes == "body" else value
-
-
 _AXES = Choice("axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
 
 
@@ -86,29 +82,23 @@ class PointForce(Force):
     value: Vec3 = key(Vector("force (N)", required=True, level=LAW, dimension=FORCE))
     axes: str = key(_AXES)
 
+    turns = False  #: whether the value is a torque
+
     def loads(self, view: View) -> list[Load]:
-        force = _in_ground_axes(view, self.marker, self.value, self.axes)
-        return [MarkerLoad(self.marker, force, vec.zero(view.graph))]
+        vector = vec.times(view.rotation(self.marker), self.value) if self.axes == "body" else self.value
+        none = vec.zero(view.graph)
+        return [MarkerLoad(self.marker, *((none, vector) if self.turns else (vector, none)))]
 
     def drawn(self) -> list[Seen]:
-        return [Pull(self.marker, self.value, self.axes == "body", turns=False)]
+        return [Pull(self.marker, self.value, self.axes == "body", self.turns)]
 
 
-class BodyTorque(Force):
+class BodyTorque(PointForce):
     """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
 
     sentence = r"A given torque $\mathbf{M}$ on a body."
     formula = r"\delta W = \mathbf{M}^T \delta \mathbf{\varphi}"
-    marker: Marker
-    value: Vec3
-    axes: str = "ground"
-
-    def loads(self, view: View) -> list[Load]:
-        torque = _in_ground_axes(view, self.marker, self.value, self.axes)
-        return [MarkerLoad(self.marker, vec.zero(view.graph), torque)]
-
-    def drawn(self) -> list[Seen]:
-        return [Pull(self.marker, self.value, self.axes == "body", turns=True)]
+    turns = True
 
 
 def _torque(e: Entry) -> Force | None:
