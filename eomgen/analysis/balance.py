@@ -17,7 +17,7 @@ from ..base.limits.constraints import STATE
 from ..base.limits.numbers import TINY
 from ..base.scales import tangent_projector
 from ..errors import ill_chosen
-from ..runtime.argument_checks import read_names, unknown
+from ..runtime.argument_checks import check_names, read_names
 from .limits import DISPLACED
 
 if TYPE_CHECKING:
@@ -99,11 +99,9 @@ def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
     """Indices of n_dof velocities from their names or those of their coordinates."""
     moving, count = layout.n_v - len(layout.states), layout.n_dof - len(layout.states)
     allowed = dict.fromkeys((*layout.velocity_labels[:moving], *layout.v[:moving]))
-    chosen, names = [], read_names("independent", names)
-    for name in names:
-        if name not in allowed:
-            raise unknown("coordinate of the tree", name, allowed)
-        chosen.append((layout.velocity_labels if name in layout.velocity_labels else layout.v).index(name))
+    names = read_names("independent", names)
+    check_names("coordinate of the tree", names, allowed)
+    chosen = [(layout.velocity_labels if name in layout.velocity_labels else layout.v).index(name) for name in names]
     if len(set(chosen)) != count or len(chosen) != count:
         raise ill_chosen(f"independent must name {count} different coordinates, not {', '.join(names)}")
     return np.array([*chosen, *range(moving, layout.n_v)], dtype=np.intp)

@@ -13,7 +13,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.results import Result, ResultTable, same_keys
 from ..errors import ProjectionError, cannot, ill_shaped, off_range
-from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
+from ..runtime.argument_checks import check_names, read_names, read_number, read_numbers
 from ..runtime.refusals import require_support
 from .limits import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
 from .regressor import (
@@ -210,9 +210,7 @@ def _not_inertial(
 ) -> tuple[Array, dict[str, Array]]:
     """Forces that are not inertial without those of the parameters of ``also``, and the column of each of these."""
     module = base.module
-    for name in also:
-        if name not in module.p_names:
-            raise unknown("parameter", name, module.p_names)
+    check_names("parameter", also, module.p_names)
     values = dict(zip(module.p_names, map(float, module.p), strict=True))
 
     def forces(name: str, factor: float) -> Array:
@@ -327,10 +325,8 @@ class BaseParameters(Result):
             An unknown name.
         """
         own = standard_parameters(self.module, p)
-        for name, value in (parameters or {}).items():
-            if name not in own:
-                raise unknown("standard parameter", name, self.standard)
-            own[name] = float(value)
+        check_names("standard parameter", parameters or (), self.standard)
+        own |= {name: float(value) for name, value in (parameters or {}).items()}
         values = self.combination @ np.array([own[name] for name in self.standard])
         return dict(zip(self.names, map(float, values), strict=True))
 

@@ -18,11 +18,10 @@ from ..base.algebra import Array
 from ..base.assembly import ClosureSystem, close, closed
 from ..base.limits.constraints import ACCEPTED
 from ..base.limits.constraints import STATE as RANK
-from ..base.names import hint, joined
 from ..base.scales import largest, least
 from ..base.texts import shown
-from ..errors import ProjectionError, UsageError, cannot, ill_shaped, ill_typed, no_such, off_range
-from ..runtime.argument_checks import read_names, read_number, read_numbers
+from ..errors import ProjectionError, UsageError, cannot, ill_typed, off_range
+from ..runtime.argument_checks import check_names, read_names, read_number, read_state
 from ..runtime.kernels import constraint_system
 from ..runtime.layout import Layout
 from .limits import NEAREST
@@ -82,9 +81,7 @@ def consistent(
     """
     module = module.bind(p, u)
     layout, t = module.layout, read_number("t", t)
-    state = np.array(read_numbers("x", x))
-    if state.shape != (layout.n_x,):
-        raise ill_shaped(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
+    state = read_state("x", x, layout.x)
     if layout.general_rates:
         raise cannot(
             "consistent() works for models with q' = v only, and the rates of this model's coordinates are given; "
@@ -105,11 +102,8 @@ def consistent(
 def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held: Sequence[str]) -> None:
     raw = () if weights is None or isinstance(weights, str) else read_names("weights", weights)
     allowed = tuple(dict.fromkeys((*layout.velocity_labels, *layout.v)))
-    for what, names in (("weights", raw), ("hold", held)):
-        for name in names:
-            if name not in allowed:
-                near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
-                raise no_such(f"{what}: no coordinate or velocity {name!r}; {near}")
+    for place, names in (("weights", raw), ("hold", held)):
+        check_names("coordinate or velocity", names, allowed, place=place)
     if isinstance(weights, Mapping):
         for name, weight in weights.items():
             if not weight > 0.0:

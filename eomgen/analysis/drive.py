@@ -19,10 +19,9 @@ from ..base import algebra
 from ..base.algebra import Array, partition
 from ..base.limits.constraints import STATE as RANK
 from ..base.limits.numbers import TINY
-from ..base.names import hint, joined
 from ..base.results import Result, plain, same_keys
 from ..errors import UsageError, cannot, ill_placed, ill_shaped, incomplete, no_such, untrue
-from ..runtime.argument_checks import read_names, read_numbers
+from ..runtime.argument_checks import check_names, read_names, read_numbers
 from ..runtime.constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from ..runtime.layout import Layout
 from ..runtime.refusals import require_support
@@ -216,10 +215,7 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
         return tuple(layout.velocity_labels[i] for i in layout.independent)
     names = read_names("actuated", actuated)
     allowed = [*layout.velocity_labels, *layout.loops, *layout.u]
-    for name in names:
-        if name not in allowed:
-            near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
-            raise no_such(f"actuated: no coordinate or input {name!r}; {near}")
+    check_names("coordinate or input", names, allowed, place="actuated")
     if not names or len(set(names)) < len(names):
         raise incomplete("actuated must name at least one coordinate or input, and each only once")
     return names

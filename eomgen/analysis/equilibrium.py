@@ -16,7 +16,7 @@ from ..base.results import Result, same_keys
 from ..base.scales import largest
 from ..base.texts import number
 from ..errors import AssemblyError, PartitionError, ill_placed, ill_shaped
-from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
+from ..runtime.argument_checks import check_names, read_names, read_number, read_numbers, unknown
 from ..runtime.initial import Initial
 from ..runtime.kernels import constraint_system
 from ..runtime.refusals import refuse_closed, require_support
@@ -234,9 +234,8 @@ def equilibrium(
         raise ill_placed(f"hold takes coordinates, not rates or states: {', '.join(initial.sort(raw).rates)}")
     q = _start(module, guess, raw, time)
     here = read_coordinates(module, q, time)
+    check_names("coordinate", wanted, here)
     for name in wanted:
-        if name not in here:
-            raise unknown("coordinate", name, here)
         raw.setdefault(name, here[name])
     raw = initial.sort(raw).positions
     search = Search(module, time, raw, unknowns, states)

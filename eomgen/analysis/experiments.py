@@ -11,7 +11,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.texts import shown
 from ..errors import ill_typed, incomplete, off_range
-from ..runtime.argument_checks import read_numbers, unknown
+from ..runtime.argument_checks import check_names, read_numbers, unknown
 from ..runtime.storage import split_head
 
 if TYPE_CHECKING:
@@ -171,9 +171,7 @@ def read_sigma(raw: Any, names: Sequence[str]) -> dict[str, float] | None:
     if raw is None:
         return None
     table = dict(raw) if isinstance(raw, Mapping) else dict.fromkeys(names, raw)
-    for name in table:
-        if name not in names:
-            raise unknown("measured column", name, names)
+    check_names("measured column", table, names)
     missing = [name for name in names if name not in table]
     if missing:
         raise incomplete(f"sigma lacks {', '.join(missing)}; give a standard deviation for every measured column")

@@ -13,7 +13,7 @@ from ..base.algebra import Array
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..base.results import Result, ResultTable, same_keys
 from ..errors import ParameterError, SimulationError, at_odds, ill_shaped, ill_typed, incomplete, no_choice, off_range
-from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping, unknown
+from ..runtime.argument_checks import check_names, read_names, read_number, require, require_mapping
 from ..runtime.layout import bounds_of, silent, warn_of_fixed
 from ..runtime.refusals import require_support
 from ..runtime.runs.simulate import simulate
@@ -308,10 +308,9 @@ class _Problem:
         self.names = tuple(start) if start else read_names("parameters", parameters)
         layout = module.layout
         self.states = (*layout.q, *layout.v, *layout.loops, *layout.loop_rates)
-        allowed = (*module.p_names, *module.u_names, *self.states)
-        for name in self.names:
-            if name not in allowed:
-                raise unknown("parameter, input, coordinate or rate", name, allowed)
+        check_names(
+            "parameter, input, coordinate or rate", self.names, (*module.p_names, *module.u_names, *self.states)
+        )
         if len(set(self.names)) < len(self.names) or not self.names:
             raise incomplete("parameters must name the unknowns, each once")
         self.initial_names = tuple(name for name in self.names if name in self.states)
@@ -434,9 +433,8 @@ def _bounds(problem: _Problem, raw: Mapping[str, Any] | None) -> tuple[Array, Ar
             low[problem.names.index(name)], high[problem.names.index(name)] = pair
     if raw is not None:
         require_mapping("bounds", raw)
+    check_names("fitted parameter", raw or (), problem.names)
     for name, pair in (raw or {}).items():
-        if name not in problem.names:
-            raise unknown("fitted parameter", name, problem.names)
         k = problem.names.index(name)
         try:
             low[k], high[k] = (float(x) for x in pair)

@@ -14,7 +14,6 @@ from ..base.algebra import Array
 from ..base.limits.constraints import MEASURED
 from ..base.limits.impacts import BEYOND, MOMENT, RESTING, STARTED, STILL, TOUCHING
 from ..base.limits.runs import CROWDED
-from ..base.names import hint, joined
 from ..base.value_rules import read_count
 from ..errors import (
     SimulationError,
@@ -26,7 +25,7 @@ from ..errors import (
     no_such,
     off_range,
 )
-from ..runtime.argument_checks import read_flag, read_number, without_dots
+from ..runtime.argument_checks import check_names, read_flag, read_number, without_dots
 from ..runtime.columns import Columns, Residuals, describe
 from ..runtime.constrained import ProjectedStates
 from ..runtime.impacts.impact import SI, Gaps, Impact, Rough, allowance, apply, find_sliding, one_state
@@ -72,11 +71,8 @@ def check_gaps(
     gaps, locked = without_dots(gaps or {}, layout.instances), [layout.plain(name) for name in locked]
     coordinates = [*layout.velocity_labels, *layout.loops]
     placed = [name for name in coordinates if name in layout.q + layout.loops]
-    for what, names, allowed in ((word, gaps, [*placed, *layout.y]), (other, locked, coordinates)):
-        for name in names:
-            if name not in allowed:
-                near = joined(hint(name, allowed), f"there are {', '.join(allowed) or 'none'}")
-                raise no_such(f"{what}: no coordinate or output {name!r}; {near}")
+    check_names("coordinate or output", gaps, [*placed, *layout.y], place=word)
+    check_names("coordinate", locked, coordinates, place=other)
     result: dict[str, float] = {}
     for name, e in (gaps or {}).items():
         result[name] = read_number(f"{word}: the restitution of {name}", e)
@@ -104,9 +100,9 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
     result: dict[str, tuple[float, tuple[str, ...]]] = {}
     placed = [name for name in (*layout.velocity_labels, *layout.loops) if name in layout.q + layout.loops]
     allowed = [*placed, *layout.y]
-    for gap, raw in without_dots(friction, layout.instances).items():
-        if gap not in gaps:
-            raise no_such(f"{word}: {gap!r} is no gap of this call; {joined(hint(gap, gaps), _listed(gaps))}")
+    friction = without_dots(friction, layout.instances)
+    check_names("gap", friction, gaps, place=word)
+    for gap, raw in friction.items():
         if isinstance(raw, str) or not isinstance(raw, Sequence) or len(raw) != 2:
             raise ill_typed(
                 f"{word}: of gap {gap} give the coefficient and the output that is its sliding velocity, "
@@ -121,10 +117,7 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
                 f"{word}: of gap {gap} give one sliding velocity, or two at right angles in space, not {raw[1]!r}"
             )
         names = tuple(layout.plain(name) for name in names)
-        for name in names:
-            if name not in allowed:
-                near = joined(hint(name, allowed), _listed(allowed))
-                raise no_such(f"{word}: no coordinate or output {name!r} for the sliding of {gap}; {near}")
+        check_names(f"coordinate or output for the sliding of {gap}:", names, allowed, place=word)
         for name in (gap, *names):
             if layout.unit(name) not in SI:
                 raise UsageError(
@@ -134,10 +127,6 @@ def check_friction(layout: Layout, friction: Any, gaps: Mapping[str, float], wor
                 )
         result[gap] = mu, names
     return result
-
-
-def _listed(names: Any) -> str:
-    return f"there are {', '.join(names) or 'none'}"
 
 
 # -- one impact --------------------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from ..errors import (
     off_range,
     too_large,
 )
-from ..runtime.argument_checks import read_flag, read_number, read_numbers, require_size, unknown
+from ..runtime.argument_checks import check_names, read_flag, read_number, read_numbers, require_size, unknown
 from ..runtime.prescribed.followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 from ..runtime.prescribed.kinematic import KinematicAnalysis, complete, describe_gap, follow_to_start, keep, start_from
 from ..runtime.refusals import require_support
@@ -54,9 +54,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     layout = module.layout
     coordinates = layout.q + layout.loops
     known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]
-    for name in named:
-        if name not in known:
-            raise unknown("coordinate or rate", name, known)
+    check_names("coordinate or rate", named, known)
     names = tuple(name for name in named if name in coordinates)
     for name in named:
         base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)

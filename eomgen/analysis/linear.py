@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from ..base.algebra import Array, Indices, rank
 from ..base.scales import minimum_norm
-from ..errors import cannot, ill_chosen, ill_shaped, no_choice
-from ..runtime.argument_checks import read_names, read_number, read_numbers, unknown
+from ..errors import cannot, ill_chosen, no_choice
+from ..runtime.argument_checks import check_names, read_names, read_number, read_state
 from ..runtime.refusals import refuse_closed, require_support
 from .balance import (
     TangentSpace,
@@ -53,9 +53,7 @@ def find_directions(module: BoundModel, t: float, x: Array, independent: Sequenc
     layout = module.layout
     n_q, n_h, n_c = layout.n_q, layout.n_h, layout.n_c
     names = () if independent is None else read_names("independent", independent)
-    for name in names:
-        if name not in layout.x:
-            raise unknown("coordinate or velocity", name, layout.x)
+    check_names("coordinate or velocity", names, layout.x)
     rows = module.kernels.assembly_jacobian(x, t=t)
     slopes, at_rest, C_q = rows[:n_h, :n_q], rows[n_h : n_h + n_c, :n_q], rows[n_h : n_h + n_c, n_q : layout.n_x]
     J = layout.place_scales.jacobian(slopes)
@@ -150,9 +148,7 @@ def linearize(
     require_support(module.layout, "linearize")
     module = module.bind(p, u)
     layout, time = module.layout, read_number("t", t)
-    state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(read_numbers("x", x))
-    if state.shape != (layout.n_x,):
-        raise ill_shaped(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
+    state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else read_state("x", x, layout.x)
     state = module.project(state, t=time)
     rates, J = module.rhs(time, state), module.jacobian(time, state)
     U = module.input_jacobian(time, state) if layout.n_u else np.zeros((layout.n_x, 0))

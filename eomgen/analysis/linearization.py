@@ -15,7 +15,7 @@ from ..base.limits.numbers import EPS, SHOWN, TINY
 from ..base.results import Result, ResultTable, same_keys
 from ..base.texts import number
 from ..errors import cannot
-from ..runtime.argument_checks import require, unknown
+from ..runtime.argument_checks import check_names, require
 from .limits import COUPLED, STILL
 
 if TYPE_CHECKING:
@@ -513,9 +513,8 @@ class Linearization(Result):
         rows = []
         positions, tangent = list(self.position_names), self.tangent
         assert tangent is not None
+        check_names("independent coordinate", chosen, positions)
         for name in chosen:
-            if name not in positions:
-                raise unknown("independent coordinate", name, positions)
             which = np.flatnonzero(tangent.velocities == tangent.positions[positions.index(name)])
             if not which.size:
                 raise cannot(

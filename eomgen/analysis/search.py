@@ -13,7 +13,7 @@ from ..base.assembly import close
 from ..base.limits.numbers import EPS, TINY
 from ..base.scales import largest
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
-from ..runtime.argument_checks import unknown
+from ..runtime.argument_checks import check_names
 from ..runtime.initial import Initial
 from .balance import Balance, balance_forces, displacement_names, force_slopes, slopes
 from .limits import ARRIVED, CLOSE, DIFFERENCES, LEAST_UNKNOWN, MOVING, SHORTEST
@@ -101,9 +101,7 @@ class Search:
         self.moving = layout.n_v - len(s)
         self.scale[self.moving :] = np.maximum(1.0, np.abs(s))
         self.module, self.layout, self.t, self.held, self.names = module, layout, t, held, tuple(unknowns)
-        for name in self.names:
-            if name not in layout.p + layout.u:
-                raise unknown("parameter or input", name, layout.p + layout.u)
+        check_names("parameter or input", self.names, layout.p + layout.u)
         self.parameters = [layout.p.index(name) for name in self.names if name in layout.p]
         self.inputs = [layout.u.index(name) for name in self.names if name in layout.u]
         self.names = tuple(layout.p[k] for k in self.parameters) + tuple(layout.u[k] for k in self.inputs)

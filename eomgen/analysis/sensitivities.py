@@ -616,7 +616,5 @@ def _checked(module: BoundModel, hold: Sequence[str]) -> list[str]:
     layout = module.layout
     allowed = (*layout.q, *layout.v, *layout.loops, *layout.loop_rates)
     names = read_names("hold", hold)
-    for name in names:
-        if name not in allowed:
-            raise unknown("coordinate or rate", name, allowed)
+    check_names("coordinate or rate", names, allowed)
     return list(names)

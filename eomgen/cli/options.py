@@ -23,7 +23,7 @@ from ..base.files import example_files, kind_of, refuse_link
 from ..base.names import closest, place_of_marker
 from ..base.results import Result, ResultTable
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number, off_range
-from ..runtime.argument_checks import unknown
+from ..runtime.argument_checks import check_names
 from ..toolchain.targets import TARGETS
 from .output import name_options, reports_failures, say, show, stage
 
@@ -567,7 +567,5 @@ def _sort_settings(module: Module, settings: dict[str, float]) -> Iterator[dict[
     groups = [[*initial_names, *filter(place_of_marker, settings)], module.p_names, module.u_names]
     known = [name for group in groups for name in group]
     settings = {module.layout.plain(name): value for name, value in settings.items()}  # leg1.hip of an instance
-    for name in settings:
-        if name not in known:
-            raise unknown("parameter, input or initial value", name, known)
+    check_names("parameter, input or initial value", settings, known)
     return ({n: v for n, v in settings.items() if n in group} or None for group in groups)

@@ -84,13 +84,11 @@ def check_columns(module: Module, picture: Picture) -> None:
     ------
     UsageError
     """
-    from ..runtime.argument_checks import unknown
+    from ..runtime.argument_checks import check_names
     from ..runtime.columns import column_names
 
     known = ("t", *column_names(module.layout))
-    for name in (*picture.columns, *((picture.against,) if picture.against else ())):
-        if module.layout.plain(name) not in known:
-            raise unknown("column", name, known)
+    check_names("column", map(module.layout.plain, filter(None, (*picture.columns, picture.against))), known)
 
 
 def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, file: Path, picture: Picture) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import wraps
 from importlib import import_module
@@ -134,6 +134,19 @@ def fitting(
     if out.size and any(step == 0 and n > 1 for step, n in zip(out.strides, shape, strict=True)):
         raise error(f"{what} has strides {out.strides}: several of its entries are one number in memory")
     return out
+
+
+def read_state(what: str, raw: Any, names: Sequence[str]) -> Array:
+    """An array of floats, one for each name.
+
+    Raises
+    ------
+    UsageError
+    """
+    result = read_numbers(what, raw)
+    if result.shape != (len(names),):
+        raise ill_shaped(f"{what} must have shape ({len(names)},) [{', '.join(names)}], not {result.shape}")
+    return result
 
 
 def read_times(what: str, raw: Any, per_time: int) -> Array:
@@ -283,11 +296,13 @@ def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
 
 
-def check_names(what: str, raw: Mapping[str, object], allowed: Collection[str], further: Collection[str] = ()) -> None:
-    """Raise :class:`UnknownNameError` for the first name not allowed; `further` ones are suggested too."""
-    for name in raw:
-        if name not in allowed:
-            raise unknown(what, name, [*allowed, *further])
+def check_names(
+    what: str, raw: Iterable[object], allowed: Collection[str], further: Collection[str] = (), place: str = ""
+) -> None:
+    """Raise :class:`UnknownNameError` for all names not allowed, a line each; `further` ones are suggested too."""
+    wrong = [unknown(what, name, [*allowed, *further], place) for name in dict.fromkeys(raw) if name not in allowed]
+    if wrong:
+        raise UnknownNameError("\n".join(map(str, wrong)))
 
 
 def read_names(what: str, raw: Any) -> tuple[str, ...]:

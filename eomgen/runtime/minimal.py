@@ -31,7 +31,7 @@ from ..errors import (
     no_number,
     too_large,
 )
-from .argument_checks import both_names, read_number, read_numbers
+from .argument_checks import both_names, read_number, read_numbers, read_state
 from .failure import place
 from .kernels import Kernels
 from .layout import Layout
@@ -300,9 +300,7 @@ class Minimal:
         q : (n_q,) array, optional
             Position of the whole tree, closed or nearly; the assembled initial position by default.
         """
-        start = self._module.assemble() if q is None else np.array(read_numbers("q", q))
-        if start.shape != (self._layout.n_q,):
-            raise ill_shaped(f"q must have shape ({self._layout.n_q},), not {start.shape}")
+        start = self._module.assemble() if q is None else np.array(read_state("q", q, self._layout.q))
         self._start[0] = self._memory.q = start
         self._memory.recent = []
 
@@ -376,9 +374,7 @@ class Minimal:
         """
         if p is not None:
             raise at_odds("the minimal form takes its parameters from its module: module.bind(p=...).minimal")
-        state = read_numbers("x", x)
-        if state.shape != (self.n_x,):
-            raise ill_shaped(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
+        state = read_state("x", x, self.x_names)
         t = read_number("t", t)
         memory = self._memory
         before = memory.q
@@ -497,9 +493,7 @@ class Canonical:
             A wrong shape.
         """
         module, layout = self._module, self._module.layout
-        z = read_numbers("z", z)
-        if z.shape != (self.n_z,):
-            raise ill_shaped(f"z must have shape ({self.n_z},) [{', '.join(self.z_names)}], not {z.shape}")
+        z = read_state("z", z, self.z_names)
         n, s = layout.n_q, layout.scales.q
         q, p = z[:n], z[n:]
         rate, N = np.zeros(layout.n_c), np.eye(layout.n_v)

@@ -14,7 +14,7 @@ from ..base.limits.runs import SPECTRUM
 from ..base.splines import cubic_piece
 from ..base.texts import TIME, html_text, label
 from ..errors import at_odds, cannot, incomplete
-from .argument_checks import plain_name, read_names, require, unknown
+from .argument_checks import check_names, plain_name, read_names, require, unknown
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -202,9 +202,7 @@ def choose(
         plain_name(name, instances) for name in (*requested, *(() if y is None else read_names("y", y)))
     )
     x = plain_name(x, instances)
-    for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
-        if name not in known:
-            raise unknown("column", name, known)
+    check_names("column", (*names, *(() if x is None else (x,))), known)  # before a figure opens
     if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
     if y is not None and x is None:

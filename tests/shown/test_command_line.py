@@ -149,11 +149,11 @@ SLIPS: list[tuple[list[Any], str]] = [
     (["sensitivity", CRANK, *NUMPY, "--end", "0.1", "--by", "l9"], "l9"),
     (["sensitivity", CRANK, *NUMPY, "--end", "0.1", "--out", "by.txt"], ".csv"),
     (["reactions", CRANK, *NUMPY, "--out", "r.csv"], "--end"),
-    (["inverse", CRANK, *NUMPY, "--actuated", "thet"], "did you mean 'theta'"),
+    (["inverse", CRANK, *NUMPY, "--actuated", "thet"], "did you mean theta"),
     (["impact", CRANK, *NUMPY], "give --gap NAME=RESTITUTION for a gap that closes, or --stop NAME"),
     (["impact", CRANK, *NUMPY, "--gap", "s"], "--gap s: write name=value, for example --gap s=0.5"),
     (["impact", CRANK, *NUMPY, "--gap", "s=2"], "--gap: the restitution of s must be between 0 and 1"),
-    (["impact", CRANK, *NUMPY, "--stop", "q"], "--stop: no coordinate or output 'q'"),
+    (["impact", CRANK, *NUMPY, "--stop", "q"], "--stop: no coordinate 'q'"),
     (["impact", CRANK, *NUMPY, "--gap", "s=0.5"], "(open); an impact needs a gap of 0"),
     (["impact", CRANK, *NUMPY, "--gap", "s=0.5", "--slip", "s"], "--slip: 's' is not NAME=MU:SPEED"),
 ]

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.algebra import Array
 from ...errors import SimulationError, calls_within, ill_shaped, no_choice
-from ..argument_checks import require, unknown
+from ..argument_checks import check_names, require, unknown
 from ..columns import Columns, describe, project, units_of_layout
 from ..inputs import Forcing
 from ..layout import Layout
@@ -94,9 +94,7 @@ def check_options(solver: Any, options: Collection[str], own: Collection[str]) -
         return
     taken = [*signature(solver.__init__).parameters]
     allowed = [name for name in taken if name not in ("self", "fun", "t0", "y0", "t_bound", "extraneous")]
-    for name in options:
-        if name not in allowed:
-            raise unknown(f"option of simulate with {solver.__name__}", name, [*own, *allowed])
+    check_names(f"option of simulate with {solver.__name__}", options, allowed, own)
 
 
 def takes_jacobian(solver: Any) -> bool:
