@@ -19,9 +19,10 @@ from ..expr.core import Expr, substitute, symbols_of
 from ..mechanics import Kinematics
 from ..model.mechanism import JointSpec
 from . import bodies
-from .checked import CheckedModel, numbers
-from .digits import FOLDED, UNIT, Number
+from .checked import CheckedModel
+from .digits import FOLDED, UNIT, Number, Numbers, array, numbers
 from .finding import Comparison, Finding, pairs, size_of
+from .identities import jacobian_at
 from .truth import Truth
 
 # -- joints ------------------------------------------------------------------------------------------------------------
@@ -58,13 +59,11 @@ def placed(truth: Truth, marker: Marker, name: str) -> bodies.Pose:
     flat = truth.system.evaluate(
         f"marker {name}", lambda: [*frame.position, *(x for row in frame.rotation for x in row)], truth.values
     )
-    position, rotation = flat[:3], [flat[3:6], flat[6:9], flat[9:12]]
+    position, rotation = flat[:3], flat[3:].reshape(3, 3)
     if marker.body == GROUND:
         return bodies.Pose(rotation, position)
     body = truth.here[marker.body]
-    return bodies.Pose(
-        bodies.product(body.rotation, rotation), bodies.add(body.position, bodies.times(body.rotation, position))
-    )
+    return bodies.Pose(body.rotation @ rotation, body.position + body.rotation @ position)
 
 
 def _joints(model: CheckedModel) -> Finding:
@@ -97,18 +96,13 @@ def _joints(model: CheckedModel) -> Finding:
             values = truth.values | {n: measured[n] for n in spec.coordinates if n in measured}
             parts = [*position, *(x for row in rotation for x in row)]
             flat = truth.system.evaluate(f"pose {spec.name}", partial(list, parts), values)
-            back = bodies.transpose(outer.rotation)
-            turn = bodies.product(back, inner.rotation)
-            place = bodies.times(back, bodies.sub(inner.position, outer.position))
-            own = [*place, *(x for row in turn for x in row)]
-            gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
-            labels += [f"{spec.name} {what}" for what in PARTS]
-            plain = _textbook(spec, truth)
-            if plain is not None:
-                flat = [*plain.position, *(x for row in plain.rotation for x in row)]
-                gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
-                labels += [f"{spec.name} {what}" for what in PARTS]
-        C = model.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)
+            back = outer.rotation.T
+            own = np.concatenate([back @ (inner.position - outer.position), (back @ inner.rotation).ravel()])
+            for expected in (flat, _textbook(spec, truth)):
+                if expected is not None:
+                    gaps += [*numbers(own - expected)]
+                    labels += [f"{spec.name} {what}" for what in PARTS]
+        C = model.module.kernels.constraint_jacobian(truth.case.q, **truth.case.timed)
         moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
         length = max(1.0, model.layout.length)
         rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
@@ -119,16 +113,15 @@ def _joints(model: CheckedModel) -> Finding:
     return result.finding()
 
 
-def _textbook(spec: JointSpec, truth: Truth) -> bodies.Pose | None:
+def _textbook(spec: JointSpec, truth: Truth) -> Numbers | None:
     """Joints of one degree, written out once more: S turned by q about z, or shifted by q along z, in P."""
     if not isinstance(spec.joint, Revolute | Prismatic) or spec.coordinates[0] not in truth.values:
         return None
-    mp, q, o = truth.mp, truth.values[spec.coordinates[0]], truth.zero
-    one = mp.mpf(1)
+    q = truth.values[spec.coordinates[0]]
     if isinstance(spec.joint, Prismatic):
-        return bodies.Pose([[one, o, o], [o, one, o], [o, o, one]], [o, o, q])
-    c, s = mp.cos(q), mp.sin(q)
-    return bodies.Pose([[c, -s, o], [s, c, o], [o, o, one]], [o, o, o])
+        return array([0, 0, q, 1, 0, 0, 0, 1, 0, 0, 0, 1])
+    c, s = truth.mp.cos(q), truth.mp.sin(q)
+    return array([0, 0, 0, c, -s, 0, s, c, 0, 0, 0, 1])
 
 
 def _freedoms(model: CheckedModel) -> Finding:
@@ -149,26 +142,23 @@ def _freedoms(model: CheckedModel) -> Finding:
             inner = placed(truth, spec.successor, f"{spec.name} S")
             for name, (angular, linear) in zip(spec.velocities, columns, strict=True):
                 flat = truth.system.evaluate(f"column {name}", lambda a=angular, l=linear: [*a, *l], truth.values)  # type: ignore[misc]
-                turn, shift = (bodies.times(inner.rotation, part) for part in (flat[:3], flat[3:]))
                 own = _relative(truth, spec, names.index(name), inner)
-                gaps += [float(x - y) for x, y in zip((*own.angular, *own.linear), (*turn, *shift), strict=True)]
+                gaps += [*numbers(own - np.concatenate([inner.rotation @ flat[:3], inner.rotation @ flat[3:]]))]
                 labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
         limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, model.layout.length)
         result.add(k, gaps, limit, 1.0, labels)
     return result.finding()
 
 
-def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodies.Twist:
-    """Twist of S relative to P at S, ground axes, in a unit of velocity j."""
-    ends = []
-    for marker in (spec.successor, spec.predecessor):
-        if marker.body == GROUND:
-            ends.append(bodies.Twist([truth.zero] * 3, [truth.zero] * 3))
-            continue
-        w = truth.virtual[j][marker.body]
-        ends.append(bodies.Twist(w.angular, w.at(bodies.sub(inner.position, truth.here[marker.body].position))))
-    s, p = ends
-    return bodies.Twist(bodies.sub(s.angular, p.angular), bodies.sub(s.linear, p.linear))
+def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> Numbers:
+    """Angular velocity and velocity of S relative to P at S (6,), ground axes, in a unit of velocity j."""
+    total = array([truth.zero] * 6)
+    for marker, sign in ((spec.successor, 1), (spec.predecessor, -1)):
+        if marker.body != GROUND:
+            w = truth.virtual[j][marker.body]
+            arm = inner.position - truth.here[marker.body].position
+            total = total + sign * np.concatenate([w.angular, w.at(arm)])
+    return total
 
 
 # -- equations of bodies -----------------------------------------------------------------------------------------------
@@ -196,10 +186,10 @@ def _inertia_sizes(truth: Truth) -> Array:
     if truth.system.mechanism.bare:
         return np.zeros(truth.n)
 
-    def norm(vector: list[Number]) -> float:
-        return float(truth.mp.sqrt(bodies.dot(vector, vector)))
+    def norm(vector: Numbers) -> float:
+        return float(truth.mp.sqrt(vector @ vector))
 
-    rates, sizes = truth.body_rates([truth.zero] * truth.n), np.abs(numbers(truth.applied()))
+    rates, sizes = truth.body_rates(), np.abs(numbers(truth.applied()))
     for j in range(truth.n):
         for body, w, rate, twist in zip(truth.bodies, truth.virtual[j], rates, truth.twists, strict=True):
             turning, inertia = norm(twist.angular) ** 2, max(norm(row) for row in body.inertia)
@@ -215,11 +205,11 @@ def _tree(model: CheckedModel, name: str) -> Finding:
     for k, truth in enumerate(model.truths):
         actual = model.call(name, truth.case).ravel()
         if name == "mass_matrix":
-            expected = numbers([x for row in truth.mass_matrix for x in row])
+            expected = numbers(truth.mass_matrix).ravel()
         elif name == "bias":
             expected = numbers(truth.bias)
         else:
-            expected = numbers(truth.inverse_dynamics([truth.mp.mpf(float(x)) for x in truth.case.a]))
+            expected = numbers(truth.mass_matrix @ truth.system.exact(truth.case.a) + truth.bias)
         if name in model.graph_kernels:
             bound = model.bounds(name, model.graph_kernels[name])[1][:, k]
         else:
@@ -245,7 +235,7 @@ def true_accelerations(model: CheckedModel, k: int) -> tuple[Array, Array, float
     """
     truth = model.truths[k]
     a, multipliers = (numbers(x) for x in truth.solve(list(model.layout.rows)))
-    mass = np.diag(numbers([x for row in truth.mass_matrix for x in row]).reshape(len(a), len(a)))
+    mass = np.diag(numbers(truth.mass_matrix))
     own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
     limit = model.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
     return a, limit, max(size_of(a), size_of(own))
@@ -266,9 +256,7 @@ def kinetic(truth: Truth) -> Number:
     """T of the bodies and the rotors of drives."""
     total = sum((b.product(w, w) for b, w in zip(truth.bodies, truth.twists, strict=True)), truth.zero)
     for name, inertia in truth.drives:
-        v = [truth.values[n] for n in truth.system.terms.v]
-        rate = sum((y * x for y, x in zip(truth.coordinate_slopes(name), v, strict=True)), truth.zero)
-        total += inertia * rate * rate
+        total += inertia * (truth.coordinate_slopes(name) @ truth.v) ** 2
     return total / 2
 
 
@@ -276,9 +264,8 @@ def potential(truth: Truth, poses: list[bodies.Pose], values: dict[str, Number])
     """V of gravity and of the force elements, with bodies at some poses."""
     total = truth.zero
     for body, pose, here in zip(truth.bodies, poses, truth.here, strict=True):
-        own = bodies.times(bodies.transpose(here.rotation), body.arm)
-        centre = bodies.add(pose.position, bodies.times(pose.rotation, own))
-        total -= body.mass * bodies.dot(truth.gravity, centre)
+        centre = pose.position + pose.rotation @ (here.rotation.T @ body.arm)
+        total -= body.mass * (truth.gravity @ centre)
     parts = [terms.potential for terms in truth.system.kinematics.forces if terms.potential is not None]
     return total + sum(truth.system.evaluate("potentials", lambda: parts, values), truth.zero)
 
@@ -305,7 +292,7 @@ def _momentum(model: CheckedModel) -> Finding:
     result, n = Comparison(check), 3 + 3 * model.layout.n_v
     bounds = model.bounds("centroidal", model.graph_kernels["centroidal"])[1]
     for k, truth in enumerate(model.truths):
-        expected = numbers([*_centre(truth), *_momenta(truth)])
+        expected = numbers(_momenta(truth))
         every = model.call("centroidal", truth.case)
         actual, limit = (np.concatenate([y[:3], y[n : n + 6]]) for y in (every, bounds[:, k]))
         labels = [f"{what} {axis}" for what in ("centre", "linear", "angular") for axis in "xyz"]
@@ -314,22 +301,16 @@ def _momentum(model: CheckedModel) -> Finding:
     return result.finding()
 
 
-def _centre(truth: Truth) -> list[Number]:
-    mass = sum((b.mass for b in truth.bodies), truth.zero)
-    total = [truth.zero] * 3
-    for body, pose in zip(truth.bodies, truth.here, strict=True):
-        total = bodies.add(total, bodies.scale(body.mass / mass, body.centre(pose)))
-    return total
-
-
-def _momenta(truth: Truth) -> list[Number]:
-    centre, linear, angular = _centre(truth), [truth.zero] * 3, [truth.zero] * 3
-    for body, pose, w in zip(truth.bodies, truth.here, truth.twists, strict=True):
-        own = bodies.scale(body.mass, w.at(body.arm))
-        linear = bodies.add(linear, own)
-        spin = bodies.times(body.inertia, w.angular)
-        angular = bodies.add(angular, bodies.add(spin, bodies.cross(bodies.sub(body.centre(pose), centre), own)))
-    return [*linear, *angular]
+def _momenta(truth: Truth) -> Numbers:
+    """The centre of mass, linear and angular momentum (9,)."""
+    mass, parts = sum((b.mass for b in truth.bodies), truth.zero), list(zip(truth.bodies, truth.here, strict=True))
+    centre = sum((body.mass / mass * (pose.position + body.arm) for body, pose in parts), truth.zero)
+    linear, angular = truth.zero, truth.zero
+    for (body, pose), w in zip(parts, truth.twists, strict=True):
+        own = body.mass * w.at(body.arm)
+        linear = linear + own
+        angular = angular + body.inertia @ w.angular + bodies.cross(pose.position + body.arm - centre, own)
+    return np.concatenate([centre, linear, angular])
 
 
 def _power(model: CheckedModel) -> Finding:
@@ -349,17 +330,13 @@ def _power(model: CheckedModel) -> Finding:
         except ZeroDivisionError:
             return Finding.skipped(check, "the system of accelerations and multipliers is singular")
         rate = _energy_rate(model, truth, a)
-        v = [truth.values[name] for name in model.terms.v]
-        parts = [f * x for f, x in zip(truth.applied(remainder=True), v, strict=True)]
-        C, rows = truth.constraint_jacobian, truth.velocity_rows
-        for row, l in zip(layout.rows, multipliers, strict=True):
-            parts.append(-l * sum((c * x for c, x in zip(C[row], v, strict=True)), truth.zero))  # C_q v = -C_t
+        # C_q v = -C_t
+        driven = -multipliers * (truth.constraint_jacobian[list(layout.rows)] @ truth.v)
+        parts = np.concatenate([truth.applied(remainder=True) * truth.v, driven])
         power = sum(parts, truth.zero)
-        momentum = np.abs(
-            numbers([sum((m * x for m, x in zip(row, v, strict=True)), truth.zero) for row in truth.mass_matrix])
-        )
+        momentum = np.abs(numbers(truth.mass_matrix @ truth.v))
         slack = model.acceleration_limit(k, numbers(exact), numbers(multipliers))
-        gap = np.abs(numbers(rows))[layout.rows] @ np.abs(numbers(multipliers)) if len(layout.rows) else 0.0
+        gap = np.abs(numbers(truth.velocity_rows))[layout.rows] @ np.abs(numbers(multipliers))
         limit = float(momentum @ slack) + float(gap) + UNIT * float(np.abs(numbers(parts)).sum())
         size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), TINY)
         result.add(k, [float(rate - power)], [limit], size)
@@ -368,11 +345,11 @@ def _power(model: CheckedModel) -> Finding:
 
 def _energy_rate(model: CheckedModel, truth: Truth, a: Array) -> Number:
     """d(T + V)/dt along q' = N v, v' = a at a held time."""
-    energies, many = model.graph_kernels["energy"], [truth.mp.mpf(float(x)) for x in a]
+    energies, exact = model.graph_kernels["energy"], truth.system.exact(a)
     return truth.slope(
-        lambda values: [sum(model.system.evaluate("kernel energy", energies, values), truth.zero)],
-        lambda s: truth.later(s, many, frozen=True),
-    )[0]
+        lambda values: sum(model.system.evaluate("kernel energy", energies, values), truth.zero),
+        lambda s: truth.later(s, exact, frozen=True),
+    )
 
 
 # -- reactions ---------------------------------------------------------------------------------------------------------
@@ -417,7 +394,7 @@ def _reactions(model: CheckedModel) -> Finding:
     for k, truth in enumerate(model.truths):
         case = truth.case
         a = model.rhs(case)[module.n_q :]
-        wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
+        wrenches = reactions(module, case.t, case.x, **case.values)
         missing, size = _unbalanced(model, truth, a, wrenches)
         result.add(k, missing, _limit(model, k, truth, wrenches, size), size_of(size), labels)
     return result.finding()
@@ -425,9 +402,9 @@ def _reactions(model: CheckedModel) -> Finding:
 
 def _limit(model: CheckedModel, k: int, truth: Truth, wrenches: np.ndarray, size: np.ndarray) -> np.ndarray:
     """What rounding allows the balances of the bodies at state k to be off by, of terms of such sizes."""
-    case, module = truth.case, model.module
+    module = model.module
     loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[model.layout.rows]
+    C = jacobian_at(module, truth.case)
     exact, multipliers = (numbers(x) for x in truth.solve(list(model.layout.rows)))
     slack = model.acceleration_limit(k, exact, multipliers) if module.layout.n_v else np.zeros(0)
     grown = (1.0 + model.dependence(C)) * UNIT * 6 * len(model.layout.bodies)
@@ -446,50 +423,41 @@ def _inertia(truth: Truth) -> np.ndarray:
     """|wrench| (6 n_bodies, n_v) that a unit of each acceleration takes, about the bodies' origins."""
     columns = []
     for row in truth.virtual:
-        flat: list[float] = []
         for body, w in zip(truth.bodies, row, strict=True):
-            force = bodies.scale(body.mass, w.at(body.arm))
-            moment = bodies.add(bodies.times(body.inertia, w.angular), bodies.cross(body.arm, force))
-            flat += [abs(float(x)) for x in (*force, *moment)]
-        columns.append(flat)
-    return np.array(columns).T.reshape(6 * len(truth.bodies), len(truth.virtual))
+            force = body.mass * w.at(body.arm)
+            columns += [force, body.inertia @ w.angular + bodies.cross(body.arm, force)]
+    return np.abs(numbers(columns)).reshape(len(truth.virtual), 6 * len(truth.bodies)).T
 
 
 def _unbalanced(
     model: CheckedModel, truth: Truth, a: np.ndarray, wrenches: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force and moment about its origin that each body lacks (6 n_bodies,), and the size of the terms."""
-    rates = truth.body_rates([truth.mp.mpf(float(x)) for x in a])
+    exact = truth.system.exact
+    rates = truth.body_rates(exact(a))
     total, size = np.zeros((len(truth.bodies), 6)), np.zeros((len(truth.bodies), 6))
 
-    def take(body: int, force: list[Number], moment: list[Number], arm: list[Number]) -> None:
-        whole = numbers([*force, *bodies.add(moment, bodies.cross(arm, force))])
+    def take(body: int, force: Numbers, moment: Numbers, arm: Numbers) -> None:
+        whole = numbers(np.concatenate([force, moment + bodies.cross(arm, force)]))
         total[body] += whole
         parts = np.abs(whole).reshape(2, 3)
         size[body] += np.repeat(parts.max(axis=1), 3)  # a vector turned from other axes is rounded as a whole
 
     for k, (body, rate, w) in enumerate(zip(truth.bodies, rates, truth.twists, strict=True)):
-        acceleration = bodies.add(rate.at(body.arm), bodies.cross(w.angular, bodies.cross(w.angular, body.arm)))
-        spin = bodies.times(body.inertia, w.angular)
-        moment = bodies.add(bodies.times(body.inertia, rate.angular), bodies.cross(w.angular, spin))
-        take(k, bodies.scale(body.mass, acceleration), moment, body.arm)
-        take(k, bodies.scale(-body.mass, truth.gravity), [truth.zero] * 3, body.arm)
+        take(k, *body.needed(rate, w.angular), body.arm)
+        take(k, -body.mass * truth.gravity, 0 * body.arm, body.arm)
     for body_index, arm, force, torque in truth.marker_loads():
-        take(body_index, bodies.scale(-1, force), bodies.scale(-1, torque), arm)
+        take(body_index, -force, -torque, arm)
     along = _along(truth, a)
     for spec, wrench in zip(model.mechanism.joints, wrenches, strict=True):
         point = placed(truth, spec.successor, f"{spec.name} S").position
-        many = [truth.mp.mpf(float(x)) for x in wrench]
+        force, moment = exact(wrench).reshape(2, 3)
         if spec.coordinates and spec.coordinates[0] in along:
-            axis = [row[2] for row in placed(truth, spec.predecessor, f"{spec.name} P").rotation]
-            own = bodies.scale(along[spec.coordinates[0]], axis)
-            many = bodies.add(
-                many, [*[truth.zero] * 3, *own] if isinstance(spec.joint, TURNING) else [*own, *[truth.zero] * 3]
-            )
+            own = along[spec.coordinates[0]] * placed(truth, spec.predecessor, f"{spec.name} P").rotation[:, 2]
+            force, moment = (force, moment + own) if isinstance(spec.joint, TURNING) else (force + own, moment)
         for end, sign in ((spec.successor, -1), (spec.predecessor, 1)):
             if end.body != GROUND:
-                arm = bodies.sub(point, truth.here[end.body].position)
-                take(end.body, bodies.scale(sign, many[:3]), bodies.scale(sign, many[3:]), arm)
+                take(end.body, sign * force, sign * moment, point - truth.here[end.body].position)
     return total.ravel(), _wrench_sum(truth, size).ravel()
 
 
@@ -507,13 +475,13 @@ def _along(truth: Truth, a: Array) -> dict[str, Number]:
     total: dict[str, Number] = {}
     for name, value in truth.coordinate_loads():
         total[name] = total.get(name, truth.zero) + value
-    many = [truth.mp.mpf(float(x)) for x in a]
+    exact = truth.system.exact(a)
     for name, inertia in truth.drives:
         if name in truth.system.kinematics.velocity_labels:
-            bend = many[truth.system.kinematics.velocity_labels.index(name)]
+            bend = exact[truth.system.kinematics.velocity_labels.index(name)]
         else:
             k = truth.system.kinematics.loop_coordinates.names.index(name)
-            bend = truth.bend(truth.measured, lambda s: truth.later(s, many))[k]
+            bend = truth.bend(truth.measured, lambda s: truth.later(s, exact))[k]
         total[name] = total.get(name, truth.zero) - inertia * bend
     return total
 
@@ -535,7 +503,7 @@ def check_reaction_laws(model: CheckedModel) -> list[Finding]:
     loads = [load.value for terms in laws for load in terms.coordinate_loads]
     for k, truth in enumerate(model.truths):
         case = truth.case
-        wrenches = reactions(model.module, case.t, case.x, p=case.p, u=case.u)
+        wrenches = reactions(model.module, case.t, case.x, **case.values)
         by_joint = dict(zip(model.layout.info.joint_names, wrenches, strict=True))
         loose = force_limit(model, k, truth, wrenches)
         acting = numbers(truth.system.evaluate("friction by reactions", lambda: loads, truth.values))
@@ -547,7 +515,7 @@ def check_reaction_laws(model: CheckedModel) -> list[Finding]:
 
 def _law(truth: Truth, force: ReactionFriction, spec: JointSpec, wrench: np.ndarray) -> tuple[float, float]:
     """The force of a law at a reaction (ground axes), and how much it grows with that."""
-    axis = numbers([row[2] for row in placed(truth, spec.successor, f"{spec.name} S").rotation])
+    axis = numbers(placed(truth, spec.successor, f"{spec.name} S").rotation[:, 2])
     along = float(wrench[:3] @ axis)
     across = float(np.linalg.norm(wrench[:3] - along * axis))
     values = [_value(truth, force, *pair) for pair in ((across, along), (across + 1.0, along), (across, along + 1.0))]

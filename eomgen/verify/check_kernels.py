@@ -10,13 +10,13 @@ import numpy as np
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.numbers import EPS, TINY
-from ..errors import EomgenError
-from .checked import CheckedModel, numbers
-from .digits import FOLDED, UNIT, Number, Numbers, bounded, solve
-from .finding import FIRST_STEP, SHORTER, Comparison, Finding, extrapolate, pairs, size_of, terms_size
+from .checked import CheckedModel
+from .digits import FOLDED, UNIT, Number, Numbers, array, bounded, numbers
+from .finding import FIRST_STEP, Comparison, Finding, pairs, size_of, terms_size
+from .identities import compare_jacobian, jacobian_at, mass_at
 from .limits import FIRST_DIFFERENCE, NO_FORCE, OFF_CONSTRAINTS, SECOND_DIFFERENCE
 from .random_states import SystemState
-from .truth import Truth, Values
+from .truth import Truth, Values, solve_constrained
 
 # -- kernels -----------------------------------------------------------------------------------------------------------
 
@@ -46,11 +46,11 @@ def _derived(model: CheckedModel) -> list[Finding]:
         outputs = Comparison("outputs: at the accelerations of the motion")
         for k, case in enumerate(model.states):
             a = model.rhs(case)[module.n_q :]
-            expected = module.kernels.motion_outputs(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
-            actual = module.outputs(case.t, case.x, p=case.p, u=case.u)
+            expected = module.kernels.motion_outputs(case.q, case.v, a, **case.timed)
+            actual = module.outputs(case.t, case.x, **case.values)
             bound = model.bounds("motion_outputs", lambda: model.terms.outputs)[1][:, k]
-            slope = module.kernels.output_derivatives(case.q, case.v, a, p=case.p, u=case.u, t=case.t)
-            C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[model.layout.rows]
+            slope = module.kernels.output_derivatives(case.q, case.v, a, **case.timed)
+            C = jacobian_at(module, case)
             shift, n = model.shift(k, C), module.n_x
             limit = (
                 2.0 * bound
@@ -79,9 +79,9 @@ def _batches(model: CheckedModel) -> Finding:
         bounds = bounded(outputs, symbols, COLUMNS)[1]
         kernel = module.kernels.kernel(name, kind="state")
         states = x if KERNEL_STATES[name] == "x" else q
-        batch = np.asarray(kernel(states, p=case.p, u=case.u, t=case.t)).reshape(-1, COLUMNS)
+        batch = np.asarray(kernel(states, **case.timed)).reshape(-1, COLUMNS)
         for k in range(COLUMNS):
-            single = np.asarray(kernel(np.ascontiguousarray(states[:, k]), p=case.p, u=case.u, t=case.t)).ravel()
+            single = np.asarray(kernel(np.ascontiguousarray(states[:, k]), **case.timed)).ravel()
             labels = [f"{name} {label}" for label in model.labels(name)]
             result.add(0, batch[:, k] - single, 2.0 * bounds[:, k], terms_size(single, bounds[:, k]), labels)
     result.states_compared = 1
@@ -107,7 +107,7 @@ def _digits(model: CheckedModel) -> Finding:
         labels = [f"{name} {label}" for label in model.labels(name)] or [name] * len(values)
         for k, truth in enumerate(model.truths):
             exact = model.system.evaluate(f"kernel {name}", outputs, truth.values)
-            apart = numbers([truth.mp.mpf(float(x)) - y for x, y in zip(values[:, k], exact, strict=True)])
+            apart = numbers(model.system.exact(values[:, k]) - exact)
             result.add(
                 k, apart, bounds[:, k] + UNIT * np.abs(numbers(exact)), terms_size(values[:, k], bounds[:, k]), labels
             )
@@ -130,7 +130,7 @@ def _jacobian(model: CheckedModel) -> Finding:
     result, layout = Comparison(check), model.layout
     bounds = model.bounds("constraint_jacobian", model.graph_kernels["constraint_jacobian"])[1]
     for k, truth in enumerate(model.truths):
-        expected = numbers([x for row in truth.constraint_jacobian for x in row])
+        expected = numbers(truth.constraint_jacobian).ravel()
         actual = model.call("constraint_jacobian", truth.case).ravel()
         limit = bounds[:, k] + UNIT * np.abs(expected)
         result.add(
@@ -186,7 +186,7 @@ def _potentials(model: CheckedModel) -> Finding:
     for k, truth in enumerate(model.truths):
         slopes = _potential_slopes(model, truth)
         every, rest = truth.applied(), truth.applied(remainder=True)
-        gap = numbers([f - r + s for f, r, s in zip(every, rest, slopes, strict=True)])
+        gap = numbers(every - rest + slopes)
         own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
         limit = (64.0 * UNIT if model.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + NO_FORCE
         if "bias" in model.graph_kernels:  # folded constants weigh more beside half a turn, as rounding does
@@ -195,14 +195,14 @@ def _potentials(model: CheckedModel) -> Finding:
     return result.finding()
 
 
-def _potential_slopes(model: CheckedModel, truth: Truth) -> list[Number]:
+def _potential_slopes(model: CheckedModel, truth: Truth) -> Numbers:
     """dV/dv' of all potentials of force elements, by each velocity."""
     parts = [terms.potential for terms in model.kinematics.forces if terms.potential is not None]
 
-    def total(values: Values) -> list[Number]:
-        return [sum(truth.system.evaluate("potentials", lambda: parts, values), truth.zero)]
+    def total(values: Values) -> Number:
+        return sum(truth.system.evaluate("potentials", lambda: parts, values), truth.zero)
 
-    return [truth.slope(total, partial(truth.displaced, j))[0] for j in range(model.layout.n_v)]
+    return array([truth.slope(total, partial(truth.displaced, j)) for j in range(model.layout.n_v)])
 
 
 # -- derivatives -------------------------------------------------------------------------------------------------------
@@ -217,71 +217,58 @@ DIRECTIONS = 2  #: random ones for each state
 
 def check_derivatives(model: CheckedModel) -> list[Finding]:
     """By the state, by inputs and by parameters."""
-    result = [_along(model), _all_directions(model)]
-    for name, n in (("input_jacobian", model.module.n_u), ("parameter_jacobian", model.module.n_p)):
+    result = [_along(model), _differences(model, "jacobian", "x")]
+    for name, by, n in (("input_jacobian", "u", model.module.n_u), ("parameter_jacobian", "p", model.module.n_p)):
         if n and name in model.module.core.names and model.layout.projects and not model.layout.general_rates:
-            result.append(_by(model, name))
+            result.append(_differences(model, name, by))
     return result
 
 
 def accelerations(model: CheckedModel, truth: Truth, values: Values) -> Numbers:
     """q' and v' at other values of a state's symbols, in many digits, from the graph."""
     terms, n, rows = model.terms, model.layout.n_v, list(model.layout.rows)
-    kernels = model.graph_kernels
 
-    def of(name: str, outputs: Callable[[], object] | None = None) -> Numbers:
-        chosen = kernels.get(name, outputs)
+    def of(name: str, outputs: Callable[[], object]) -> Numbers:
+        chosen = model.graph_kernels.get(name, outputs)
         return model.system.evaluate(f"kernel {name}", chosen, values)  # type: ignore[arg-type]
 
-    M = of("mass_matrix", lambda: [x for row in model.terms.mass_matrix for x in row])
-    C = of("constraint_jacobian", lambda: [x for row in terms.constraint_jacobian for x in row])
+    M = of("mass_matrix", lambda: [x for row in terms.mass_matrix for x in row]).reshape(n, n)
+    C = of("constraint_jacobian", lambda: [x for row in terms.constraint_jacobian for x in row]).reshape(-1, n)
     gamma, h = of("gamma", lambda: terms.gamma), of("bias", lambda: terms.bias)
-    C_rows = [C[n * i : n * i + n] for i in rows]
-    matrix = [[*M[n * i : n * i + n], *(row[i] for row in C_rows)] for i in range(n)]
-    matrix += [[*row, *[truth.zero] * len(rows)] for row in C_rows]
-    z = solve(matrix, [[-x] for x in h] + [[-gamma[i]] for i in rows])
-    return [*truth.rates(values), *(x[0] for x in z[:n])]
+    return np.concatenate([truth.rates(values), solve_constrained(M, C[rows], h, gamma[rows])[0]])
 
 
 def _condition(model: CheckedModel, case: SystemState) -> float:
     """Condition of the system of accelerations and multipliers, rows and columns of like size."""
-    module = model.module
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[model.layout.rows]
-    M, m = module.kernels.mass_matrix(case.q, p=case.p, u=case.u, t=case.t), len(C)
+    M, C = mass_at(model.module, case), jacobian_at(model.module, case)
+    m = len(C)
     d = 1.0 / np.sqrt(np.maximum(np.diag(M), TINY + EPS * size_of(np.diag(M))))
     M, C = M * d * d[:, None], C * d
     C = C / np.maximum(np.linalg.norm(C, axis=1), TINY)[:, None]
-    return float(algebra.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if module.layout.n_v else 1.0
+    return float(algebra.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if len(M) else 1.0
 
 
 def _tangent(model: CheckedModel, truth: Truth, rng: np.random.Generator) -> tuple[Array, Array]:
     """A random displacement w (n_v,) and change of velocity (n_v,) along the constraints."""
-    case, module, n = truth.case, model.module, model.layout.n_v
-    C = module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[model.layout.rows]
+    n, C = model.layout.n_v, jacobian_at(model.module, truth.case)
     back = algebra.pinv(C) if len(C) else np.zeros((n, 0))
     free = np.eye(n) - back @ C if len(C) else np.eye(n)
-    sizes = module.layout.scales.q
+    sizes = model.layout.scales.q
     w, change = free @ (sizes * rng.standard_normal(n)), free @ (sizes * rng.standard_normal(n))
     if len(C):
         turned = truth.slope(
             lambda values: model.system.evaluate("velocity", lambda: model.terms.velocity_constraints, values),
-            lambda s: _shifted(truth, s, w, np.zeros(n)),
+            _line(truth, w, np.zeros(n)),
         )
         change = change - back @ numbers(turned)[model.layout.rows]
     return w, change
 
 
-def _shifted(truth: Truth, s: object, w: Array, change: Array) -> Values:
+def _line(truth: Truth, w: Array, change: Array) -> Callable[[Number], Values]:
     """The state moved by s along w and change."""
-    terms, number = truth.system.terms, truth.mp.mpf
-    values = dict(truth.values)
-    for j, x in enumerate(w):
-        for name, column in zip(terms.q, truth.columns[j], strict=True):
-            if column:
-                values[name] = values[name] + s * number(float(x)) * column
-    for name, x in zip(terms.v, change, strict=True):
-        values[name] = values[name] + s * number(float(x))
-    return values
+    terms, exact = truth.system.terms, truth.system.exact
+    dq, dv = exact(w) @ truth.columns, exact(change)
+    return lambda s: truth.values | truth.moved(terms.q, s * dq) | truth.moved(terms.v, s * dv)
 
 
 def _along(model: CheckedModel) -> Finding:
@@ -297,20 +284,18 @@ def _along(model: CheckedModel) -> Finding:
     result, rng = Comparison(check), np.random.default_rng(1)
     for k, truth in enumerate(model.truths):
         case = truth.case
-        J = model.module.jacobian(case.t, case.x, p=case.p, u=case.u)
-        condition = _condition(model, case) * model.dependence(
-            model.module.kernels.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)[model.layout.rows]
-        )
+        J = model.module.jacobian(case.t, case.x, **case.values)
+        condition = _condition(model, case) * model.dependence(jacobian_at(model.module, case))
         # where terms of the forces cancel, their slopes do too
         exact, multipliers = (numbers(x) for x in truth.solve(list(model.layout.rows)))
         slack = np.concatenate([np.zeros(model.layout.n_q), model.acceleration_limit(k, exact, multipliers)])
         for _ in range(DIRECTIONS):
             try:
                 w, change = _tangent(model, truth, rng)
-                expected = numbers(truth.slope(_state_rates(model, truth), _line(truth, w, change)))
+                expected = numbers(truth.slope(partial(accelerations, model, truth), _line(truth, w, change)))
             except ZeroDivisionError:
                 return Finding.skipped(check, "the system of accelerations and multipliers is singular")
-            d = np.concatenate([_moved(truth, w), change])
+            d = np.concatenate([w @ numbers(truth.columns), change])
             size = max(size_of(np.abs(J) @ np.abs(d)), size_of(model.rhs(case)))
             limit = 4.0 * model.layout.n_x * UNIT * condition * size + slack * max(1.0, size_of(d))
             result.add(k, J @ d - expected, limit, size, model.labels("rhs"))
@@ -318,108 +303,26 @@ def _along(model: CheckedModel) -> Finding:
     return result.finding()
 
 
-def _state_rates(model: CheckedModel, truth: Truth) -> Callable[[Values], Numbers]:
-    return lambda values: accelerations(model, truth, values)
-
-
-def _line(truth: Truth, w: Array, change: Array) -> Callable[[object], Values]:
-    return lambda s: _shifted(truth, s, w, change)
-
-
-def _moved(truth: Truth, w: Array) -> Array:
-    """N w, the change of the coordinates."""
-    return np.array([numbers(column) for column in truth.columns]).T @ w if len(w) else np.zeros(0)
-
-
 def _noise(model: CheckedModel, k: int) -> Array:
     """By how much rounding may move x' (n_x,)."""
     truth, layout = model.truths[k], model.layout
     a, multipliers = (numbers(x) for x in truth.solve(list(layout.rows)))
-    C = model.module.kernels.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t)[
-        layout.rows
-    ]
-    rates = np.abs(model.slopes(truth.case))[: layout.n_q] @ model.shift(k, C)
+    moved = model.shift(k, jacobian_at(model.module, truth.case))
+    rates = np.abs(model.slopes(truth.case))[: layout.n_q] @ moved
     return np.concatenate([rates, model.acceleration_limit(k, a, multipliers)])
 
 
-def _all_directions(model: CheckedModel) -> Finding:
-    """Every column, across the constraints too, by extrapolated differences."""
-    check, module, layout = "jacobian: differences of rhs", model.module, model.layout
-    if "jacobian" not in module.core.names:
+def _differences(model: CheckedModel, name: str, by: str) -> Finding:
+    """Every column of a Jacobian, across the constraints too, by extrapolated differences."""
+    check, module, case = f"{name}: differences of rhs", model.module, model.states[0]
+    if name not in module.core.names:
         return Finding.skipped(check, "there is no kernel")
-    case = model.states[0]
-    J = module.jacobian(case.t, case.x, p=case.p, u=case.u)
-    scales = np.concatenate([_coordinate_sizes(model), layout.scales.q])
-
-    def column(j: int) -> Callable[[float], Array]:
-        def f(s: float) -> Array:
-            x = np.array(case.x)
-            x[j] += s * scales[j]
-            return module.rhs(case.t, x, p=case.p, u=case.u)
-
-        return f
-
-    return _compare(
-        model, check, J * scales, [column(j) for j in range(layout.n_x)], layout.x, size_of(layout.scales.q)
-    )
-
-
-def _coordinate_sizes(model: CheckedModel) -> Array:
-    return np.array([model.layout.length if kind == "length" else 1.0 for kind in model.layout.coordinate_kinds])
-
-
-def _by(model: CheckedModel, name: str) -> Finding:
-    module, case = model.module, model.states[0]
-    inputs = name == "input_jacobian"
-    names, values = (module.u_names, case.u) if inputs else (module.p_names, case.p)
-    J = getattr(module, name)(case.t, case.x, p=case.p, u=case.u)
-    scales = np.where(values != 0.0, np.abs(values), 1.0) * (1.0 if inputs else 0.2)
-
-    def column(j: int) -> Callable[[float], Array]:
-        def f(s: float) -> Array:
-            raw = np.array(values)
-            raw[j] += s * scales[j]
-            p, u = (case.p, raw) if inputs else (raw, case.u)
-            return module.rhs(case.t, case.x, p=p, u=u)
-
-        return f
-
-    return _compare(model, f"{name}: differences of rhs", J * scales, [column(j) for j in range(len(names))], names)
-
-
-def _compare(
-    model: CheckedModel,
-    check: str,
-    J: Array,
-    columns: list[Callable[[float], Array]],
-    names: tuple[str, ...],
-    least: float = 0.0,
-) -> Finding:
-    """``least``: size of columns of any such Jacobian, which counts where constraints leave no motion."""
-    result, condition = Comparison(check), _condition(model, model.states[0])
     try:
         noise = _noise(model, 0)
     except ZeroDivisionError:
         return Finding.skipped(check, "the system of accelerations and multipliers is singular")
-    noise = np.maximum(noise, 2.0 * EPS * size_of(model.rhs(model.states[0])))  # where drivers alone give accelerations
-    slopes, errors, left_out = [], [], []
-    step = OFF_CONSTRAINTS if len(model.layout.rows) else FIRST_STEP
-    rounding = 4.0 * model.layout.n_x * UNIT * condition
-    for j, f in enumerate(columns):
-        slope, error = J[:, j], np.zeros(len(J))
-        try:
-            for first in (step, SHORTER * step):
-                slope, error = extrapolate(f, noise, first)
-                if (np.abs(slope - J[:, j]) <= error + rounding * size_of(slope)).all():
-                    break
-        except EomgenError:
-            left_out.append(names[j])
-        slopes.append(slope)
-        errors.append(error)
-    if left_out:
-        result.note = f"without {', '.join(left_out)}: no consistent state was found nearby"
-    expected, error = np.array(slopes).T, np.array(errors).T
-    size = max(size_of(expected), size_of(model.rhs(model.states[0])), least)
-    limit = error + rounding * size
-    result.add(0, J - expected, limit, size, pairs(model.labels("rhs"), names))
-    return result.finding()
+    noise = np.maximum(noise, 2.0 * EPS * size_of(model.rhs(case)))  # where drivers alone give accelerations
+    least = size_of(model.layout.scales.q) if by == "x" else 0.0
+    known = noise, 4.0 * model.layout.n_x * UNIT * _condition(model, case), least
+    first = OFF_CONSTRAINTS if len(model.layout.rows) else FIRST_STEP
+    return compare_jacobian(module, check, name, by, [case], first, known)

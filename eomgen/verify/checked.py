@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -74,15 +74,14 @@ class CheckedModel:
 
     def call(self, kernel: str, case: SystemState) -> Array:
         """A compiled kernel at a case; its result for one state."""
-        kernels, raw = self.module.kernels, {"p": case.p, "u": case.u}
-        takes = NAMED[kernel].inputs
+        kernels, takes = self.module.kernels, NAMED[kernel].inputs
         if takes == ("q", "v", "a"):
-            return np.asarray(kernels.kernel(kernel)(case.q, case.v, case.a, **raw, t=case.t))
-        return np.asarray(kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **raw, t=case.t))
+            return np.asarray(kernels.kernel(kernel)(case.q, case.v, case.a, **case.timed))
+        return np.asarray(kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **case.timed))
 
     def rhs(self, case: SystemState) -> Array:
         """x'."""
-        return self.module.rhs(case.t, case.x, p=case.p, u=case.u)
+        return self.module.rhs(case.t, case.x, **case.values)
 
     # -- the straight-line kernels and what they are on the graph -----------------------------------------------------
     @cached_property
@@ -131,7 +130,7 @@ class CheckedModel:
         E_h = self.bounds("bias", lambda: self.terms.bias)[1][:, k]
         E_g = self.bounds("gamma", lambda: self.terms.gamma)[1][layout.rows, k]
         if self.terms.by_columns:
-            M = module.kernels.mass_matrix(case.q, p=case.p, u=case.u, t=case.t)
+            M = module.kernels.mass_matrix(case.q, **case.timed)
             E_M = n * UNIT * np.abs(M)
         d = np.sqrt(np.maximum(np.diag(M), 0.0))
         E_M = E_M + FOLDED * np.outer(d, d)
@@ -163,7 +162,7 @@ class CheckedModel:
     def shift(self, k: int, C: Array) -> Array:
         """By how much the projection may move a state (n_x,) on the constraints."""
         layout, case = self.layout, self.states[k]
-        x = self.module.project(case.x, t=case.t, p=case.p, u=case.u)
+        x = self.module.project(case.x, t=case.t, **case.values)
         moved = np.abs(x - case.x) + UNIT * np.abs(case.x)
         if len(C):
             rows = layout.rows
@@ -195,7 +194,7 @@ class CheckedModel:
             x = np.array(case.x)
             h = NUDGE * (1.0 + abs(x[k]))
             x[k] += h
-            columns.append((self.module.rhs(case.t, x, p=case.p, u=case.u) - base) / h)
+            columns.append((self.module.rhs(case.t, x, **case.values) - base) / h)
         return np.array(columns).T if columns else np.zeros((0, 0))
 
 
@@ -208,8 +207,3 @@ def _inverse(K: Array) -> Array:
             d = d / np.sqrt(np.where(size > 0.0, size, 1.0))
         scaled = K * d * d[:, None]
     return np.asarray(algebra.pinv(scaled, rcond=EXACT) * d * d[:, None])
-
-
-def numbers(values: Sequence[Any]) -> Array:
-    """Numbers of many digits as an array of doubles."""
-    return np.array([float(x) for x in values], dtype=float)

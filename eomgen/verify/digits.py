@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import factorial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.algebra import Array
 from ..base.limits.numbers import EPS
@@ -28,7 +29,17 @@ FIRST = "1e-16"  #: step of first differences: truncation 1e-32, rounding 1e-44
 SECOND = "1e-12"  #: step of second differences: truncation 1e-24, rounding 1e-36
 
 Number = Any  # mpmath's mpf
-Numbers = list[Number]
+Numbers: TypeAlias = NDArray[np.object_]  #: arrays of these, of any shape
+
+
+def array(values: Any) -> Numbers:
+    """Numbers of many digits, in lists of lists, as an array."""
+    return np.array(values, dtype=object)
+
+
+def numbers(values: Any) -> Array:
+    """Numbers of many digits as an array of doubles."""
+    return np.asarray(values, dtype=float)
 
 
 def context() -> Any:
@@ -89,7 +100,7 @@ class Digits:
 
     def __call__(self, values: Mapping[str, Number]) -> Numbers:
         """Values of the outputs."""
-        data: Numbers = []
+        data: list[Number] = []
         for name, operation, args in self._steps:
             if name is not None:
                 data.append(values[name])
@@ -97,7 +108,7 @@ class Digits:
                 data.append(operation(*(data[k] for k in args)))
             else:
                 data.append(operation)
-        return [data[k] for k in self._outputs]
+        return array([data[k] for k in self._outputs])
 
 
 class _Local:
@@ -137,41 +148,25 @@ class _Local:
                     self.terms.append((powers, self.mp.mpf(float(value))))
 
 
-def solve(matrix: list[Numbers], right: list[Numbers]) -> list[Numbers]:
-    """Solutions of A X = Y by elimination with row pivots.
-
-    Parameters
-    ----------
-    matrix : n rows of n numbers
-    right : n rows of k numbers
+def solve(A: Numbers, y: Numbers) -> Numbers:
+    """The x (n,) with A x = y, by elimination with row pivots.
 
     Raises
     ------
     ZeroDivisionError
         A is singular.
     """
-    n = len(matrix)
-    rows = [[*a, *b] for a, b in zip(matrix, right, strict=True)]
+    n, rows = len(A), np.column_stack([A, y])
     for k in range(n):
-        best = max(range(k, n), key=lambda i: abs(rows[i][k]))
-        rows[k], rows[best] = rows[best], rows[k]
-        pivot = rows[k]
-        for i in range(k + 1, n):
-            if rows[i][k]:
-                factor = rows[i][k] / pivot[k]
-                rows[i] = [
-                    *rows[i][: k + 1],
-                    *(x - factor * y if y else x for x, y in zip(rows[i][k + 1 :], pivot[k + 1 :], strict=True)),
-                ]
-    solution: list[Numbers] = [[] for _ in range(n)]
+        best = k + int(abs(rows[k:, k]).argmax())
+        rows[[k, best]] = rows[[best, k]]
+        for row in rows[k + 1 :]:
+            if row[k]:
+                row[k + 1 :] -= row[k] / rows[k, k] * rows[k, k + 1 :]
+    x = rows[:, n]
     for i in reversed(range(n)):
-        row = rows[i]
-        values = row[n:]
-        for j in range(i + 1, n):
-            if row[j]:
-                values = [x - row[j] * y for x, y in zip(values, solution[j], strict=True)]
-        solution[i] = [x / row[i] for x in values]
-    return solution
+        x[i] = (x[i] - rows[i, i + 1 : n] @ x[i + 1 :]) / rows[i, i]
+    return x
 
 
 def _each(mp: Any, outputs: list[Expr], names: Sequence[str]) -> Any:

@@ -46,12 +46,14 @@ def identities(module: BoundModel, states: Sequence[SystemState]) -> list[Findin
     return result
 
 
-def _mass(module: BoundModel, c: SystemState) -> Array:
-    return module.kernels.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+def mass_at(module: BoundModel, c: SystemState) -> Array:
+    """M of the tree."""
+    return module.kernels.mass_matrix(c.q, **c.timed)
 
 
-def _jacobian(module: BoundModel, c: SystemState) -> Array:
-    return module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[module.layout.rows]
+def jacobian_at(module: BoundModel, c: SystemState) -> Array:
+    """The independent rows of C_q."""
+    return module.kernels.constraint_jacobian(c.q, **c.timed)[module.layout.rows]
 
 
 def _definite(module: BoundModel, states: Sequence[SystemState]) -> Finding:
@@ -65,7 +67,7 @@ def _definite(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         return Finding.skipped(check, "the model accepts masses and inertias that no body can have")
     result = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in states:
-        M = module.kernels.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+        M = module.kernels.embedded_mass_matrix(c.q, **c.timed)
         result.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
         smallest = float(algebra.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
         result.add(c.number, [max(0.0, -smallest)], [0.0])
@@ -78,8 +80,8 @@ def _kinetic(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         return Finding.skipped(check, "there are no bodies")
     result = Comparison(check)
     for c in states:
-        v, M = c.v[: module.n_v], module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
-        T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(v @ M @ v) / 2.0
+        v, M = c.v[: module.n_v], module.mass_matrix(c.q, **c.timed)
+        T, expected = float(module.energy(c.x, **c.timed)[0]), float(v @ M @ v) / 2.0
         size = float(np.abs(v) @ np.abs(M) @ np.abs(v)) / 2.0
         result.add(c.number, [T - expected], [KERNEL * size], size)
     return result.finding()
@@ -88,8 +90,8 @@ def _kinetic(module: BoundModel, states: Sequence[SystemState]) -> Finding:
 def _inverse(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     result = Comparison("inverse_dynamics: M a + h")
     for c in states:
-        M, h = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u)
-        expected = module.kernels.inverse_dynamics(c.q, c.v, c.a, p=c.p, u=c.u, t=c.t)
+        M, h = mass_at(module, c), module.kernels.bias(c.t, c.x, **c.values)
+        expected = module.kernels.inverse_dynamics(c.q, c.v, c.a, **c.timed)
         size = size_of(np.abs(M) @ np.abs(c.a) + np.abs(h))
         result.add(c.number, M @ c.a + h - expected, KERNEL * size, size, module.layout.v)
     return result.finding()
@@ -107,7 +109,7 @@ def _slopes(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
     result, n_h = Comparison(check), module.layout.n_h
     for c in states:
-        C = module.kernels.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)[:n_h]
+        C = module.kernels.constraint_jacobian(c.q, **c.timed)[:n_h]
         for j, scale in enumerate(module.layout.scales.q):
             way = _rates(module, c.q, np.eye(module.layout.n_v)[j]) * scale
             slope, error = extrapolate(_along_q(module, c, way), KERNEL * size_of(C) * size_of(c.q))
@@ -118,15 +120,15 @@ def _slopes(module: BoundModel, states: Sequence[SystemState]) -> Finding:
 
 
 def _along_q(module: BoundModel, c: SystemState, way: Array) -> Callable[[float], Array]:
-    return lambda s: module.constraints(c.q + s * way, p=c.p, u=c.u, t=c.t, rows="all")
+    return lambda s: module.constraints(c.q + s * way, **c.timed, rows="all")
 
 
 def _projection(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """Projected twice is projected once; loops are closed there, and at ``x0``."""
     result, scales = Comparison("project: idempotent, closes loops, keeps x0"), module.layout.scales
     for c in states:
-        x = module.project(c.x, t=c.t, p=c.p, u=c.u)
-        again = module.project(x, t=c.t, p=c.p, u=c.u)
+        x = module.project(c.x, t=c.t, **c.values)
+        again = module.project(x, t=c.t, **c.values)
         result.add(c.number, again - x, CLOSED * size_of(x), size_of(x), module.x_names)
         for state, t, p, u in ((x, c.t, c.p, c.u), (module.x0(), 0.0, module.p, module.u)):
             gap = scales.residual(module.constraints(state[: module.n_q], t=t, p=p, u=u, rows="all"))
@@ -139,8 +141,8 @@ def _balance(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """B^T (M a + h) = 0, B the motions that the constraints leave (their null space by singular values)."""
     result = Comparison("rhs: forces in balance along free motions")
     for c in states:
-        a = module.rhs(c.t, c.x, p=c.p, u=c.u)[module.n_q :]
-        M, h, C = _mass(module, c), module.kernels.bias(c.t, c.x, p=c.p, u=c.u), _jacobian(module, c)
+        a = module.rhs(c.t, c.x, **c.values)[module.n_q :]
+        M, h, C = mass_at(module, c), module.kernels.bias(c.t, c.x, **c.values), jacobian_at(module, c)
         scale = module.layout.scales.q
         free = _null(C * scale) * scale[:, None]
         size = np.abs(free).T @ (np.abs(M) @ np.abs(a) + np.abs(h))
@@ -165,11 +167,6 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
     return float(own * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
-def condition_at(module: BoundModel, c: SystemState) -> float:
-    """By how much solving for accelerations at a case magnifies rounding."""
-    return _condition(_mass(module, c), _jacobian(module, c), module.layout.scales.q)
-
-
 def _holding(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
     check = "rhs: constraints stay satisfied"
@@ -177,11 +174,11 @@ def _holding(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
     result = Comparison(check)
     for c in states:
-        rate = module.rhs(c.t, c.x, p=c.p, u=c.u)
+        rate = module.rhs(c.t, c.x, **c.values)
         time_scale = 1.0 / max(size_of(rate), 1.0)
-        C = _jacobian(module, c)
+        C = jacobian_at(module, c)
         size = size_of(np.abs(C) @ np.abs(rate[module.n_q :])) * time_scale
-        condition = _condition(_mass(module, c), C, module.layout.scales.q)
+        condition = _condition(mass_at(module, c), C, module.layout.scales.q)
         noise = KERNEL * size_of(np.abs(C) @ np.abs(c.v))
         slope, error = extrapolate(_along_x(module, c, rate, time_scale), noise)
         result.add(c.number, slope, error + KERNEL * condition * size, max(size, noise))
@@ -215,7 +212,7 @@ def _minimal(module: BoundModel, states: Sequence[SystemState]) -> Finding:
         minimal.reset(c.q)
         full = minimal.reduce(bound.rhs(c.t, c.x))
         own = minimal.rhs(c.t, minimal.reduce(c.x))
-        condition = _condition(_mass(module, c), _jacobian(module, c), layout.scales.q)
+        condition = _condition(mass_at(module, c), jacobian_at(module, c), layout.scales.q)
         size = size_of(bound.rhs(c.t, c.x))
         result.add(c.number, own - full, CLOSED * condition * size, size, minimal.x_names)
     return result.finding()
@@ -242,7 +239,6 @@ KINEMATIC = (_slopes, _projection)
 
 
 STATES = 2  #: states that are tried
-STEPS = (FIRST_STEP, SHORTER * FIRST_STEP)
 NAMES = {"jacobian": "x", "input_jacobian": "u", "parameter_jacobian": "p"}  #: kernel -> what it differentiates by
 
 
@@ -255,29 +251,54 @@ def jacobians(module: BoundModel, states: Sequence[SystemState]) -> list[Finding
         if size and exact and name in module.core.names:
             check = f"{name}: extrapolated differences of rhs"
             try:
-                result.append(_compare(module, check, name, by, states[:STATES]))
+                result.append(compare_jacobian(module, check, name, by, states[:STATES]))
             except EomgenError as error:
                 result.append(failed(check, error))
     return result
 
 
-def _compare(module: BoundModel, check: str, name: str, by: str, states: Sequence[SystemState]) -> Finding:
+def compare_jacobian(
+    module: BoundModel,
+    check: str,
+    name: str,
+    by: str,
+    states: Sequence[SystemState],
+    first: float = FIRST_STEP,
+    known: tuple[Array, float, float] | None = None,
+) -> Finding:
+    """A Jacobian beside differences of the right-hand side.
+
+    Parameters
+    ----------
+    name : str
+        Of the kernel.
+    by : {'x', 'u', 'p'}
+    first : float
+        The first step of differences.
+    known : (array, float, float), optional
+        By how much rounding may move x' (n_x,) and, relative to its size, the Jacobian; and the size of columns of any
+        such Jacobian, which counts where constraints leave no motion.  By default from the condition of the equations.
+    """
     result, layout = Comparison(check), module.layout
     names = {"x": layout.x, "u": module.u_names, "p": module.p_names}[by]
     left_out: set[str] = set()
     for c in states:
-        J, rate = getattr(module, name)(c.t, c.x, p=c.p, u=c.u), module.rhs(c.t, c.x, p=c.p, u=c.u)
-        scales, condition = _scales(module, c, by), condition_at(module, c)
-        noise = KERNEL * condition * max(size_of(rate), size_of(layout.scales.q))
+        J, rate = getattr(module, name)(c.t, c.x, **c.values), module.rhs(c.t, c.x, **c.values)
+        scales = _scales(module, c, by)
+        if known is None:
+            rounding = KERNEL * _condition(mass_at(module, c), jacobian_at(module, c), layout.scales.q)
+            noise, least = np.full(layout.n_x, rounding * max(size_of(rate), size_of(layout.scales.q))), 0.0
+        else:
+            noise, rounding, least = known
         for j, label in enumerate(names):
-            size = max(size_of(J * scales), size_of(rate))
+            size = max(size_of(J * scales), size_of(rate), least)
             compared: tuple[Array, Array] | None = None
-            for step in STEPS:
+            for step in (first, SHORTER * first):
                 try:
                     slope, error = extrapolate(_along(module, c, by, j, float(scales[j])), noise, step)
                 except EomgenError:
                     continue
-                compared = slope - J[:, j] * scales[j], error + KERNEL * condition * size
+                compared = slope - J[:, j] * scales[j], error + rounding * size
                 if (np.abs(compared[0]) <= compared[1]).all():
                     break
             if compared is None:

@@ -53,6 +53,16 @@ class SystemState(NamedTuple):
         """Velocities."""
         return self.x[self.n_q :]
 
+    @property
+    def values(self) -> dict[str, Any]:
+        """Parameters and inputs, as calls take them."""
+        return {"p": self.p, "u": self.u}
+
+    @property
+    def timed(self) -> dict[str, Any]:
+        """And the time."""
+        return self.values | {"t": self.t}
+
 
 def random_states(module: BoundModel, count: int, seed: int = 0, at_values: bool = False) -> list[SystemState]:
     """States that move, on the constraints.
@@ -191,7 +201,7 @@ CALLS: dict[str, Callable[[SystemState], tuple[Any, ...]]] = {
 def called(module: BoundModel, call: str, case: SystemState) -> Array:
     """What a call of a module gives at a state; of one that is not in the table at its position."""
     arguments = CALLS[call](case) if call in CALLS else (case.q,)
-    raw: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
+    raw = case.values if call in TIMED else case.timed
     return np.asarray(getattr(module, call)(*arguments, **raw), dtype=float)
 
 
@@ -225,7 +235,7 @@ def record_calls(name: str, module: BoundModel | None) -> str:
 
 def _record(module: BoundModel, call: str, case: SystemState, number: int) -> dict[str, Any] | None:
     """One call at one state; None where the model has no such result, or none that is finite."""
-    raw: dict[str, Any] = {"p": case.p, "u": case.u} | ({} if call in TIMED else {"t": case.t})
+    raw = case.values if call in TIMED else case.timed
     rng = np.random.default_rng(SEED)
     try:
         values = [called(module, call, case)]

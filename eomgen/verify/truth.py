@@ -7,20 +7,155 @@ equations: as they were given.  Constraints: differences of C along the motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, partial
+from itertools import count
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..elements.frames import GROUND
+from ..expr.core import Expr
 from . import bodies
-from .bodies import Matrix, Pose, Rigid, Twist
-from .digits import FIRST, SECOND, Number, Numbers, solve
-from .precise_states import PreciseState, PreciseSystem, Values
+from .bodies import Pose, Rigid, Twist
+from .digits import FIRST, SECOND, Digits, Number, Numbers, array, context, solve
 
-__all__ = ["PreciseState", "PreciseSystem", "Truth", "Values"]
+if TYPE_CHECKING:
+    from ..codegen.terms import SystemTerms
+    from ..reading.derivation import Derivation
+    from .random_states import SystemState
+
+Values = dict[str, Number]
 
 
-class Truth(PreciseState):
-    """One state of a model; every quantity is found when it is first asked for."""
+class PreciseSystem:
+    """A model's expressions in many digits, and its description: what a :class:`Truth` is found from.
+
+    Parameters
+    ----------
+    terms : SystemTerms
+        Of the same equations.
+    """
+
+    def __init__(self, equations: Derivation, terms: SystemTerms) -> None:
+        self.equations, self.terms = equations, terms
+        self.kinematics = equations.kinematics
+        self.mechanism = equations.kinematics.mechanism
+        self.mp = context()
+        self._ready: dict[str, Digits] = {}
+
+    def evaluate(self, name: str, outputs: Callable[[], Sequence[Expr]], values: Mapping[str, Number]) -> Numbers:
+        """Values of expressions that are prepared once, under a name."""
+        if name not in self._ready:
+            self._ready[name] = Digits(self.mp, list(outputs()))
+        return self._ready[name](values)
+
+    def exact(self, values: Iterable[float]) -> Numbers:
+        """Doubles, exactly as they are."""
+        return array([self.mp.mpf(float(x)) for x in values])
+
+    def values(self, case: SystemState) -> Values:
+        """All symbols at a case."""
+        terms = self.terms
+        names = (*terms.q, *terms.v, *terms.a, *terms.p, *terms.u, terms.t)
+        return dict(zip(names, self.exact((*case.x, *case.a, *case.p, *case.u, case.t)), strict=True))
+
+
+class Truth:
+    """One state of a model, and the ways that lead through it; every quantity is found when it is first asked for.
+
+    Parameters
+    ----------
+    system : PreciseSystem
+    case : SystemState
+    """
+
+    def __init__(self, system: PreciseSystem, case: SystemState) -> None:
+        self.system, self.case, self.mp = system, case, system.mp
+        self.values = system.values(case)
+        self.n = len(system.terms.v)
+        self.zero = self.mp.mpf(0)
+        self.v = self.of(system.terms.v)
+
+    def of(self, names: Sequence[str], values: Values | None = None) -> Numbers:
+        """Values by name."""
+        values = self.values if values is None else values
+        return array([values[name] for name in names])
+
+    # -- moving the state ---------------------------------------------------------------------------------------------
+    def rates(self, values: Values) -> Numbers:
+        """q' at some values."""
+        terms = self.system.terms
+        if not terms.rates:
+            return self.of(terms.v[: self.n - terms.n_states], values)
+        return self.system.evaluate("rates", lambda: terms.rates, values)
+
+    @cached_property
+    def columns(self) -> Numbers:
+        """N^T (n_v, n_q): q' of each velocity alone."""
+        still = self.values | dict.fromkeys(self.system.terms.v, self.zero)
+        base, one = self.rates(still), self.mp.mpf(1)
+        return array([self.rates(still | {name: one}) - base for name in self.system.terms.v])
+
+    def moved(self, names: Sequence[str], changes: Numbers) -> Values:
+        """Values by name with changes added."""
+        return dict(zip(names, self.of(names) + changes, strict=True))
+
+    def displaced(self, j: int, step: Number) -> Values:
+        """The coordinates moved along velocity j."""
+        return self.values | self.moved(self.system.terms.q, step * self.columns[j])
+
+    def later(self, step: Number, a: Numbers | None = None, frozen: bool = False) -> Values:
+        """The state a time later, with accelerations a (0 by default): q + s q' + s^2 q'' / 2, v + s a, t + s.
+
+        ``frozen``: time and inputs stand still.
+        """
+        terms = self.system.terms
+        a = array([self.zero] * self.n) if a is None else a
+        moved = self.moved(terms.q, step * self.rates(self.values) + step * step * self._second_rates(a) / 2)
+        moved |= self.moved(terms.v, step * a)
+        if not frozen:
+            moved[terms.t] = self.values[terms.t] + step
+            moved |= self._moved_inputs(step)
+        return self.values | moved
+
+    def _moved_inputs(self, step: Number) -> Values:
+        """Inputs whose rates are inputs too move with them, by Taylor's series up to the last rate."""
+        next_of, moved = dict(self.system.terms.input_rates), dict[str, Number]()
+        for name in next_of:
+            total, factor, rate = self.values[name], self.mp.mpf(1), next_of.get(name)
+            for order in count(1):
+                if rate is None:
+                    break
+                factor *= step / order
+                total += factor * self.values[rate]
+                rate = next_of.get(rate)
+            moved[name] = total
+        return moved
+
+    def _second_rates(self, a: Numbers) -> Numbers:
+        """q'' along q', v' = a."""
+        terms = self.system.terms
+        if not terms.rates:
+            return a[: self.n - terms.n_states]
+
+        def along(s: Number) -> Values:
+            moved = self.moved(terms.q, s * self.rates(self.values)) | self.moved(terms.v, s * a)
+            return self.values | moved | {terms.t: self.values[terms.t] + s}
+
+        return self.slope(self.rates, along)
+
+    def slope(self, f: Callable[[Values], Numbers], along: Callable[[Number], Values]) -> Numbers:
+        """Central difference of a function along a way."""
+        h = self.mp.mpf(FIRST)
+        result: Numbers = (f(along(h)) - f(along(-h))) / (2 * h)
+        return result
+
+    def bend(self, f: Callable[[Values], Numbers], along: Callable[[Number], Values]) -> Numbers:
+        """Second difference of a function along a way."""
+        h = self.mp.mpf(SECOND)
+        result: Numbers = (f(along(h)) - 2 * f(along(self.zero)) + f(along(-h))) / (h * h)
+        return result
 
     # -- bodies -------------------------------------------------------------------------------------------------------
     def poses(self, values: Values) -> list[Pose]:
@@ -54,14 +189,14 @@ class Truth(PreciseState):
         """Twists of the bodies in the motion."""
         return self._moving()[0]
 
-    def _moving(self, a: Sequence[Number] | None = None) -> tuple[list[Twist], list[Twist]]:
+    def _moving(self, a: Numbers | None = None) -> tuple[list[Twist], list[Twist]]:
         """Twists and their rates, in a motion with accelerations a."""
         h = self.mp.mpf(SECOND)
         ahead, behind = self.poses(self.later(h, a)), self.poses(self.later(-h, a))
         ends = list(zip(ahead, behind, self.here, strict=True))
         return [bodies.difference(*x, h) for x in ends], [bodies.second_difference(*x, h) for x in ends]
 
-    def body_rates(self, a: Sequence[Number]) -> list[Twist]:
+    def body_rates(self, a: Numbers | None = None) -> list[Twist]:
         """Angular accelerations and accelerations of the origins."""
         return self._moving(a)[1]
 
@@ -78,18 +213,16 @@ class Truth(PreciseState):
         return self.system.evaluate("measured", lambda: terms.loop_coordinates[:n], values)
 
     @cached_property
-    def measured_slopes(self) -> list[Numbers]:
+    def measured_slopes(self) -> Numbers:
         """dy of the coordinates of cut joints in a unit of each velocity: (n_v, n_loop_coordinates)."""
-        return [self.slope(self.measured, partial(self.displaced, j)) for j in range(self.n)]
+        return array([self.slope(self.measured, partial(self.displaced, j)) for j in range(self.n)])
 
     def coordinate_slopes(self, name: str) -> Numbers:
         """dy/dv' of a joint's coordinate, of the tree or cut."""
         freedoms, cut = self.system.kinematics.velocity_labels, self.system.kinematics.loop_coordinates.names
         if name in freedoms:
-            k = freedoms.index(name)
-            return [self.mp.mpf(j == k) for j in range(self.n)]
-        k = cut.index(name)
-        return [row[k] for row in self.measured_slopes]
+            return array([self.mp.mpf(j == freedoms.index(name)) for j in range(self.n)])
+        return self.measured_slopes[:, cut.index(name)]
 
     def marker_loads(self, remainder: bool = False) -> list[tuple[int, Numbers, Numbers, Numbers]]:
         """Body, arm from its origin, force and torque of every load on a body, ground axes."""
@@ -104,11 +237,10 @@ class Truth(PreciseState):
             lambda: [x for load in loads for x in (*load.marker.frame.position, *load.force, *load.torque)],
             self.values,
         )
-        result = []
-        for k, load in enumerate(loads):
-            body, nine = load.marker.body, flat[9 * k : 9 * k + 9]
-            result.append((body, bodies.times(self.here[body].rotation, nine[:3]), nine[3:6], nine[6:9]))
-        return result
+        return [
+            (load.marker.body, self.here[load.marker.body].rotation @ arm, force, torque)
+            for load, (arm, force, torque) in zip(loads, flat.reshape(-1, 3, 3), strict=True)
+        ]
 
     def coordinate_loads(self, remainder: bool = False) -> list[tuple[str, Number]]:
         """Generalized forces along joint coordinates."""
@@ -120,15 +252,18 @@ class Truth(PreciseState):
         flat = self.system.evaluate(f"along {remainder}", lambda: [load.value for load in loads], self.values)
         return [(load.coordinate, x) for load, x in zip(loads, flat, strict=True)]
 
+    def along(self, force: Numbers, torque: Numbers, body: int, arm: Numbers) -> Numbers:
+        """The power (n_v,) of a wrench at a point of a body in a unit of each velocity."""
+        twists = (w[body] for w in self.virtual)
+        return array([force @ w.at(arm) + torque @ w.angular if w.moves else self.zero for w in twists])
+
     def applied(self, remainder: bool = False) -> Numbers:
         """Generalized forces of the force elements, by virtual power; those without a potential only if asked."""
-        total = [self.zero] * self.n
+        total = array([self.zero] * self.n)
         for body, arm, force, torque in self.marker_loads(remainder):
-            for j in range(self.n):
-                w = self.virtual[j][body]
-                total[j] += bodies.dot(force, w.at(arm)) + bodies.dot(torque, w.angular)
+            total = total + self.along(force, torque, body, arm)
         for name, value in self.coordinate_loads(remainder):
-            total = [f + value * y for f, y in zip(total, self.coordinate_slopes(name), strict=True)]
+            total = total + value * self.coordinate_slopes(name)
         return total
 
     @cached_property
@@ -142,7 +277,7 @@ class Truth(PreciseState):
 
     # -- equations of motion of the tree ------------------------------------------------------------------------------
     @cached_property
-    def mass_matrix(self) -> Matrix:
+    def mass_matrix(self) -> Numbers:
         """M of the tree."""
         mechanism = self.system.mechanism
         if mechanism.lagrangian is not None:
@@ -150,17 +285,17 @@ class Truth(PreciseState):
         if mechanism.given is not None:
             lower = mechanism.given.mass_matrix
             flat = self.system.evaluate("given mass", lambda: [x for row in lower for x in row], self.values)
-            return [[flat[max(i, j) * self.n + min(i, j)] for j in range(self.n)] for i in range(self.n)]
-        M = [[self.zero] * self.n for _ in range(self.n)]
+            return array([[flat[max(i, j) * self.n + min(i, j)] for j in range(self.n)] for i in range(self.n)])
+        M = array([[self.zero] * self.n] * self.n)
         for i in range(self.n):
             for j in range(i + 1):
                 pairs = zip(self.bodies, self.virtual[i], self.virtual[j], strict=True)
-                M[i][j] = M[j][i] = sum((b.product(w, z) for b, w, z in pairs if w.moves and z.moves), self.zero)
+                M[i, j] = M[j, i] = sum((b.product(w, z) for b, w, z in pairs if w.moves and z.moves), self.zero)
         for name, inertia in self.drives:
             y = self.coordinate_slopes(name)
-            M = [[x + inertia * y[i] * y[j] for j, x in enumerate(row)] for i, row in enumerate(M)]
+            M = M + inertia * y[:, None] * y
         for k in range(self.n - len(mechanism.states), self.n):
-            M[k][k] = self.mp.mpf(1)
+            M[k, k] = self.mp.mpf(1)
         return M
 
     @cached_property
@@ -171,61 +306,49 @@ class Truth(PreciseState):
             return self._lagrangian_bias()
         if mechanism.given is not None:
             forcing = mechanism.given.forcing
-            return [-x for x in self.system.evaluate("given forcing", lambda: forcing, self.values)]
-        rates, total = self.body_rates([self.zero] * self.n), [-f for f in self.applied()]
-        for j in range(self.n):
-            for body, w, rate, twist in zip(self.bodies, self.virtual[j], rates, self.twists, strict=True):
-                if w.moves:
-                    weight = body.mass * bodies.dot(self.gravity, w.at(body.arm))
-                    total[j] += body.power(w, rate, twist.angular) - weight
+            return -self.system.evaluate("given forcing", lambda: forcing, self.values)
+        total = -self.applied()
+        for k, (body, rate, twist) in enumerate(zip(self.bodies, self.body_rates(), self.twists, strict=True)):
+            force, moment = body.needed(rate, twist.angular)
+            total = total + self.along(force - body.mass * self.gravity, moment, k, body.arm)
         for name, inertia in self.drives:
             if name in self.system.kinematics.velocity_labels:
                 continue  # its y'' is that velocity's own acceleration
             k = self.system.kinematics.loop_coordinates.names.index(name)
-            bend = self.bend(self.measured, self.later)[k]
-            total = [f + inertia * bend * y for f, y in zip(total, self.coordinate_slopes(name), strict=True)]
+            total = total + inertia * self.bend(self.measured, self.later)[k] * self.coordinate_slopes(name)
         flow = self.system.evaluate("states", lambda: self.system.kinematics.state_rates, self.values)
-        return [*total[: self.n - len(flow)], *(-s for s in flow)]
-
-    def inverse_dynamics(self, a: Sequence[Number]) -> Numbers:
-        """M a + h."""
-        return [h + sum((m * x for m, x in zip(row, a, strict=True)), self.zero)
-                for row, h in zip(self.mass_matrix, self.bias, strict=True)]  # fmt: skip
+        total[self.n - len(flow) :] = -flow
+        return total
 
     # -- a bare Lagrangian --------------------------------------------------------------------------------------------
-    def _lagrange(self, values: Values) -> Number:
-        bare = self.system.mechanism.lagrangian
-        assert bare is not None
-        return self.system.evaluate("L", lambda: [bare.expression], values)[0]
-
     def _momentum(self, values: Values) -> Numbers:
         """dL/dv by central differences; L may be of any form."""
-        h = self.mp.mpf(SECOND)
-        up = [self._lagrange(values | {name: values[name] + h}) for name in self.system.terms.v]
-        down = [self._lagrange(values | {name: values[name] - h}) for name in self.system.terms.v]
-        return [(x - y) / (2 * h) for x, y in zip(up, down, strict=True)]
+        bare, h = self.system.mechanism.lagrangian, self.mp.mpf(SECOND)
+        assert bare is not None
+        return array([self._slope("L", bare.expression, name, h, values) for name in self.system.terms.v])
 
-    def _lagrangian_mass(self) -> Matrix:
+    def _slope(self, label: str, expression: Expr, name: str, h: Number, values: Values) -> Number:
+        """Central difference by one symbol."""
+        up, down = (
+            self.system.evaluate(label, lambda: [expression], values | {name: values[name] + s})[0] for s in (h, -h)
+        )
+        return (up - down) / (2 * h)
+
+    def _lagrangian_mass(self) -> Numbers:
         h = self.mp.mpf(SECOND)
         columns = []
         for name in self.system.terms.v:
-            ends = [self._momentum(self.values | {name: self.values[name] + s}) for s in (h, -h)]
-            columns.append([(x - y) / (2 * h) for x, y in zip(*ends, strict=True)])
-        return [list(row) for row in zip(*columns, strict=True)]
+            up, down = (self._momentum(self.values | {name: self.values[name] + s}) for s in (h, -h))
+            columns.append((up - down) / (2 * h))
+        return array(columns).T
 
     def _lagrangian_bias(self) -> Numbers:
-        bare, h = self.system.mechanism.lagrangian, self.mp.mpf(SECOND)
+        bare, h, terms = self.system.mechanism.lagrangian, self.mp.mpf(SECOND), self.system.terms
         assert bare is not None
-        ahead, behind = (self._momentum(self.later(s)) for s in (h, -h))
-        drift = [(x - y) / (2 * h) for x, y in zip(ahead, behind, strict=True)]
-        forces = self.system.evaluate("Q", lambda: bare.forces, self.values)
-        total = []
-        for j, (name, rate) in enumerate(zip(self.system.terms.q, self.system.terms.v, strict=True)):
-            ends = [self._lagrange(self.values | {name: self.values[name] + s}) for s in (h, -h)]
-            moved = [self.values | {rate: self.values[rate] + s} for s in (h, -h)]
-            drag = [self.system.evaluate("D", lambda: [bare.dissipation], values)[0] for values in moved]
-            total.append(drift[j] - (ends[0] - ends[1]) / (2 * h) - forces[j] + (drag[0] - drag[1]) / (2 * h))
-        return total
+        drift = (self._momentum(self.later(h)) - self._momentum(self.later(-h))) / (2 * h)
+        pull = array([self._slope("L", bare.expression, name, h, self.values) for name in terms.q])
+        drag = array([self._slope("D", bare.dissipation, name, h, self.values) for name in terms.v])
+        return array(drift - pull - self.system.evaluate("Q", lambda: bare.forces, self.values) + drag)
 
     # -- constraints --------------------------------------------------------------------------------------------------
     def holonomic(self, values: Values) -> Numbers:
@@ -240,38 +363,46 @@ class Truth(PreciseState):
         )
 
     @cached_property
-    def constraint_jacobian(self) -> Matrix:
-        """C_q N by differences of C, and A of nonholonomic rows, by the linearity of A v + b."""
+    def constraint_jacobian(self) -> Numbers:
+        """C_q N (n_c, n_v) by differences of C, and A of nonholonomic rows, by the linearity of A v + b."""
         one, terms = self.mp.mpf(1), self.system.terms
         still = self.values | dict.fromkeys(terms.v, self.zero)
         base = self.rate_rows(still)
-        columns = []
-        for j, name in enumerate(terms.v):
-            own = self.slope(self.holonomic, partial(self.displaced, j))
-            columns.append([*own, *bodies.sub(self.rate_rows(still | {name: one}), base)])
-        return [list(row) for row in zip(*columns, strict=True)] if columns else []
+        columns = [
+            [*self.slope(self.holonomic, partial(self.displaced, j)), *(self.rate_rows(still | {name: one}) - base)]
+            for j, name in enumerate(terms.v)
+        ]
+        return array(columns).reshape(self.n, terms.n_c).T
 
     @cached_property
     def velocity_rows(self) -> Numbers:
         """C' along the motion."""
-        return [*self.slope(self.holonomic, self.later), *self.rate_rows(self.values)]
+        return array([*self.slope(self.holonomic, self.later), *self.rate_rows(self.values)])
 
     @cached_property
     def gamma(self) -> Numbers:
         """C'' at v' = 0, along the motion."""
-        return [*self.bend(self.holonomic, self.later), *self.slope(self.rate_rows, self.later)]
+        return array([*self.bend(self.holonomic, self.later), *self.slope(self.rate_rows, self.later)])
 
     def solve(self, rows: Sequence[int]) -> tuple[Numbers, Numbers]:
-        """Accelerations and multipliers: [M C^T; C 0] [a; l] = -[h; gamma] with the rows given.
+        """Accelerations and multipliers with the rows given.
 
         Raises
         ------
         ZeroDivisionError
             The matrix is singular.
         """
-        C, n = [self.constraint_jacobian[i] for i in rows], self.n
-        matrix = [[*self.mass_matrix[i], *(row[i] for row in C)] for i in range(n)]
-        matrix += [[*row, *[self.zero] * len(C)] for row in C]
-        right = [[-h] for h in self.bias] + [[-self.gamma[i]] for i in rows]
-        z = [x[0] for x in solve(matrix, right)]
-        return z[:n], z[n:]
+        rows = list(rows)
+        return solve_constrained(self.mass_matrix, self.constraint_jacobian[rows], self.bias, self.gamma[rows])
+
+
+def solve_constrained(M: Numbers, C: Numbers, h: Numbers, gamma: Numbers) -> tuple[Numbers, Numbers]:
+    """Accelerations and multipliers: [M C^T; C 0] [a; l] = -[h; gamma].
+
+    Raises
+    ------
+    ZeroDivisionError
+        The matrix is singular.
+    """
+    z = solve(np.block([[M, C.T], [C, np.zeros((len(C), len(C)), dtype=object)]]), -np.concatenate([h, gamma]))
+    return z[: len(h)], z[len(h) :]

@@ -87,7 +87,7 @@ def _compared(model: CheckedModel, check: str, other: BoundModel) -> Finding:
             return Finding.skipped(check, "the system of accelerations and multipliers is singular")
         case, names = truth.case, model.layout.v
         x = _state_of(model, case, other)
-        rates = dict(zip(other.layout.v, other.rhs(case.t, x, p=case.p, u=case.u)[other.n_q :], strict=True))
+        rates = dict(zip(other.layout.v, other.rhs(case.t, x, **case.values)[other.n_q :], strict=True))
         shared = [i for i, name in enumerate(names) if name in rates]
         actual = np.array([rates[names[i]] for i in shared])
         result.add(k, actual - a[shared], limit[shared], size, [f"{names[i]}'" for i in shared])
