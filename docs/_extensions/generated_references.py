@@ -135,11 +135,6 @@ class Verbs(SphinxDirective):
         for part in (command.help or "").replace("\b", "").split("\n\n"):
             yield from (_cell(part), "")
         yield from options_table(command)
-        if isinstance(command, click.Group):
-            for word in command.list_commands(context):
-                inner = command.get_command(context, word)
-                if inner is not None:
-                    yield from self._verb(f"{name} {word}", inner)
 
 
 class Constructs(SphinxDirective):

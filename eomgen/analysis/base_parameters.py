@@ -180,7 +180,6 @@ class _Data:
         return np.where(result > 0.0, result, 1.0)
 
     def residuals(self, beta: Array) -> Array:
-        """Measured less computed."""
         return np.asarray(self.target - np.tensordot(beta, self.columns, (0, 1)))
 
     def noise(self, beta: Array, unknowns: int) -> Array:

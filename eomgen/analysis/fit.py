@@ -337,7 +337,6 @@ class _Problem:
         warn_of_fixed(layout, p, [name for name in declared if any(name not in raw for raw in by_name)])
 
     def _bound(self, name: str) -> float:
-        """The value that holds now."""
         module = self.module
         if name in module.p_names:
             return float(module.p[module.p_names.index(name)])
@@ -352,7 +351,6 @@ class _Problem:
         raise incomplete(f"give a value to start from for {name}: parameters={{{name!r}: ...}}")
 
     def arguments(self, values: Array, one: Experiment) -> dict[str, Any]:
-        """What ``simulate`` takes for an experiment."""
         table = dict(zip(self.names, map(float, values), strict=True))
         module = self.module
         initial: Any = one.initial
@@ -369,7 +367,6 @@ class _Problem:
         }
 
     def run(self, values: Array, one: Experiment) -> Trajectory:
-        """The run of an experiment."""
         with silent():
             return simulate(self.module, **self.arguments(values, one))
 
@@ -395,7 +392,6 @@ class _Problem:
         return np.concatenate(parts)
 
     def jacobian(self, values: Array) -> Array:
-        """Derivatives of the residuals by the values."""
         parts = []
         for one in self.experiments:
             with silent():

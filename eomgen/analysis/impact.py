@@ -381,7 +381,6 @@ class GapEvents(Events):
         return float(self._values[i])
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
-        """The state after events at time t."""
         own, known = [i for i in fired if i < self._first], len(self.impacts)
         x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action != WAIT])
         closed = self.gaps.values(t, x) <= self.limits
@@ -398,7 +397,6 @@ class GapEvents(Events):
         return x
 
     def crowded(self, t: float, count: int) -> SimulationError:
-        """The error for gaps that close without an impact."""
         return SimulationError(
             f"the gap {', '.join(self.gaps.names)} closes again and again at t = {t:.6g} s without an impact",
             code="EG-EVENT",
@@ -423,7 +421,6 @@ class GapEvents(Events):
         return x
 
     def _slow(self, t: float, x: Array, closed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Closed gaps (n,) that do not open."""
         if not closed.any() or t >= self.end:
             return np.zeros_like(closed)
         layout = self.gaps.layout
@@ -564,7 +561,6 @@ def _record(
 
 
 def _refuse_beyond(gaps: Gaps, t: Array, x: Array) -> None:
-    """Refuse to hand out states beyond a wall."""
     values = gaps.values(t, x)
     beyond = values < -allowance(gaps.layout, gaps.names, BEYOND)[:, None]
     if beyond.any():

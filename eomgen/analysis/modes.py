@@ -212,7 +212,6 @@ def stiffness(linear: Linearization) -> Array:
 
 
 def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
-    """Squares of the frequencies and mode shapes."""
     if not M.size:
         return np.zeros(0), np.zeros((0, 0))
     factor = definite_factor(M, "modes")

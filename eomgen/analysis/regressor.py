@@ -227,7 +227,6 @@ def _columns(module: BoundModel, q: Array, v: Array, a: Array, p: Any, t: float)
 
 
 def _parts(terms: Array) -> Array:
-    """w, v, alpha, A of each body, (n_bodies, 4, 3, k)."""
     return np.asarray(terms[:, :MOTION].reshape(len(terms), 4, 3, -1))
 
 

@@ -251,7 +251,6 @@ class Variational:
         self.still = Move(np.zeros((layout.n_x, k)), np.zeros(k), self.du, self.dp)
 
     def slopes(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
-        """x' and S', S without weights."""
         u = self.forcing(t, x)
         S_dot = self.tangent(t, x, u=u) @ S
         if self.columns.parameters:
@@ -272,7 +271,6 @@ class Variational:
         return moved._replace(t=dt, u=du + np.multiply.outer(by_t, dt))
 
     def at(self, t: float, x: Array) -> BoundModel:
-        """The module with the inputs there."""
         return self.module.bind(u=self.forcing(t, x))
 
     def input_slopes(self, t: float, x: Array) -> SlopesNow | None:
@@ -280,11 +278,9 @@ class Variational:
         return self.inputs(t, x) if self.forcing else None
 
     def consistent(self, t: float, x: Array, S: Array) -> Array:
-        """The nearest S (n_x, k) that keeps the constraints."""
         return keep_consistent(self.at(t, x), t, x, S, self.columns, self.input_slopes(t, x))
 
     def __call__(self, t: float, z: Array) -> Array:
-        """z' of z."""
         x, S = self.split(z)
         x_dot, S_dot = self.slopes(t, x, S)
         return self.joined(x_dot, S_dot)
@@ -295,7 +291,6 @@ class Variational:
         return z[:n], z[n:].reshape(n, -1) / self.weights
 
     def joined(self, x: Array, S: Array) -> Array:
-        """z of x and S."""
         return np.concatenate([x, (S * self.weights).ravel()])
 
     def rates(self, t: Array, x: Array, S: Array | None) -> tuple[Array, Array, Array, Array, Array]:
@@ -552,7 +547,6 @@ class Saltation(Events):
         return self.run.joined(x_after, S)
 
     def stop(self, t: float, z: Array, index: int) -> None:
-        """Note an event that ended the run."""
         x, S = self._consistent(t, *self.run.split(z))
         before = self._sides(t, x)[0]
         self._refuse_others(t, x, index, before)
@@ -610,7 +604,6 @@ class Saltation(Events):
         return np.concatenate([every[1 : 1 + self.n], every[:1], np.zeros(n_u), every[1 + self.n :]])[None]
 
     def _value(self, t: float, x: Array, index: int) -> float:
-        """An event's value."""
         first = len(self.model)
         if index < first:
             kernel = self.module.kernels.kernel("events", nan=True)
@@ -672,7 +665,6 @@ class Saltation(Events):
         return sides[0], sides[1]
 
     def _consistent(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
-        """A state and its derivatives, brought onto the constraints."""
         x = np.asarray(self.module.project(x, t=t, u=self.run.forcing(t, x)))
         return x, self.run.consistent(t, x, S)
 

@@ -51,7 +51,6 @@ class Solver:
         self.inverse = np.where(self.kept, 1.0 / np.where(self.kept, values, 1.0), 0.0)
 
     def solve(self, residual: Array) -> Array:
-        """The correction."""
         return np.asarray(-self.V.T @ (self.inverse * (self.U.T @ (residual / self.sizes))))
 
     def shown(self, change: Array) -> Array:
@@ -108,7 +107,6 @@ class Search:
         self.supported = bool(held) and not self.names
 
     def bound(self, values: Array) -> BoundModel:
-        """The module with values of the unknowns."""
         if not self.names:
             return self.module
         p, u = self.module.p, self.module.u
@@ -117,7 +115,6 @@ class Search:
         return self.module.bind(p, u)
 
     def initial_unknowns(self) -> Array:
-        """What is bound now."""
         return np.concatenate([self.module.p[self.parameters], self.module.u[self.inputs]])
 
     def rows_to_hold(self, module: BoundModel, q: Array) -> list[Held]:
@@ -159,7 +156,6 @@ class Search:
         return d
 
     def at(self, q: Array, states: Array, values: Array, preferred: Indices | None = None) -> SearchPoint:
-        """The iterate near q on the constraints."""
         module = self.bound(values)
         initial = Initial(module.kernels, self.t)
         if self.layout.n_h:
@@ -245,7 +241,6 @@ class Search:
         return np.asarray(basis.T @ (s[:, None] * point.module.kernels.mass_matrix(point.q, t=self.t) * s) @ basis)
 
     def mass(self, point: SearchPoint) -> Array:
-        """Mass matrix of the independent velocities."""
         B = point.here.B
         return np.asarray(B.T @ point.module.kernels.mass_matrix(point.q, t=self.t) @ B)
 
@@ -390,7 +385,6 @@ class BalanceRows:
     def move(
         self, place: tuple[SearchPoint, LinearizedResidual], change: Array
     ) -> tuple[SearchPoint, LinearizedResidual] | None:
-        """The place a step away."""
         self.steps += 1
         there = self.search.step(place[0], place[1].moved @ change, place[1].changed @ change)
         try:
@@ -501,7 +495,6 @@ def _corrected(
 
 
 def _definite(A: Array) -> bool:
-    """Whether the symmetric part is positive definite."""
     try:
         np.linalg.cholesky(0.5 * (A + A.T))
     except np.linalg.LinAlgError:

@@ -600,7 +600,6 @@ def _require_same(result: Trajectory, single: Trajectory) -> None:
 
 
 def _note_end(salts: Saltation, solution: Solution) -> None:
-    """Note the event that ended the run, the last one that can."""
     ending = [k for k, event in enumerate(salts.every) if event.terminal and len(solution.t_events[k])]
     last = max(ending, key=lambda k: abs(float(solution.t_events[k][-1] - solution.ends[0])))
     salts.stop(float(solution.t_events[last][-1]), solution.x_events[last][:, -1], last)

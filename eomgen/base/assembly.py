@@ -189,7 +189,6 @@ class AssemblyFailure(NamedTuple):
     restarts: int
 
     def message(self) -> str:
-        """What failed, and what to do."""
         raw = self._given(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
         if self.flipped:
             return (
@@ -341,7 +340,6 @@ class ConstraintSystem(NamedTuple):
     t: float = 0.0
 
     def at(self, t: float) -> ConstraintSystem:
-        """The same at another time."""
         return self._replace(t=t)
 
     def position(self, q: Array) -> tuple[Array, Array]:
@@ -396,7 +394,6 @@ class ConstraintSystem(NamedTuple):
         )
 
     def closure(self, held: Mapping[str, float]) -> ClosureSystem:
-        """The equations where these values are held."""
         free = np.ones(len(self.scales.q))
         free[self.scales.velocities(self.indices(held))] = 0.0
         return ClosureSystem(self.position, self.scales, free, self.wanted(held))

@@ -67,21 +67,17 @@ class StraightPath(NamedTuple):
 
     @property
     def scales(self) -> Scales:
-        """The scales of positions."""
         scales: Scales = self.driven.scales
         return scales
 
     def at(self, s: float) -> tuple[float, Array]:
-        """Time and values."""
         return self.t + s * self.t1, self.y + s * self.y1
 
     def tangent(self, s: float, q: Array) -> Tangent:
-        """The direction at a position of the path."""
         result: Tangent = self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
         return result
 
     def solve(self, s: float, guess: Array) -> Point | None:
-        """The point next to a guess."""
         result = self.driven.solve(*self.at(s), self.t1, self.y1, guess)
         return None if result is None else Point(s, *result)
 
@@ -203,7 +199,6 @@ class Continuation:
         return None
 
     def _moved(self, k: int) -> float:
-        """Scaled distance of a point from the last one."""
         return largest(self.scales.distance(self.points[-1].q, self.points[k].q))
 
 
@@ -239,11 +234,9 @@ class HeldPath:
         self.length = max(largest(self.way), largest(self.gap / equations.scales) if equations else 0.0)
 
     def _at(self, s: float) -> ConstraintSystem:
-        """The constraints at the time there."""
         return self.system.at(self.end if s == 1.0 else self.system.t + s * (self.end - self.system.t))
 
     def solve(self, s: float, guess: Array) -> Point | None:
-        """The point next to a guess; None if Newton's iteration finds none."""
         q = np.array(guess)
         q[self.held] = self.values if s == 1.0 else self.scales.move(self.start, s * self.way)[self.held]
         equations = self.equations and self.equations._replace(values=self.equations.values + (1.0 - s) * self.gap)
@@ -256,7 +249,6 @@ class HeldPath:
         return None
 
     def tangent(self, s: float, q: Array) -> Tangent:
-        """The direction of the least motion."""
         system = ClosureSystem(self._at(s).position, self.scales, np.ones_like(self.free), self.equations)
         _, J = system.evaluate(q)
         right = -J @ self.way

@@ -103,7 +103,6 @@ class Operation(NamedTuple):
 
     @property
     def bends(self) -> bool:
-        """Whether it may jump or bend."""
         return self.kind in (CHOICE, CONDITION)
 
     @property
@@ -124,7 +123,6 @@ class Operation(NamedTuple):
         return self.body or self.c.format("a != 0.0" if self.chooses else "a", "b", "c")
 
     def raised(self, sympy: Any, *operands: Any) -> Any:
-        """Its SymPy expression."""
         return getattr(sympy, self.sympy)(*operands) if isinstance(self.sympy, str) else self.sympy(sympy, *operands)
 
 

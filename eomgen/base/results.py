@@ -87,17 +87,14 @@ class Result:
 
     @property
     def title(self) -> str:
-        """First line of the text."""
         raise NotImplementedError
 
     @property
     def facts(self) -> list[tuple[str, str]]:
-        """Label and value of each line of the text."""
         raise NotImplementedError
 
     @property
     def tables(self) -> Sequence[ResultTable]:
-        """What lines do not hold."""
         return ()
 
     def to_dict(self) -> dict[str, Any]:

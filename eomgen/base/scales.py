@@ -99,7 +99,6 @@ class Space(NamedTuple):
         return result
 
     def normalised(self, q: Array) -> Array:
-        """q with Euler parameters of length 1."""
         result = np.array(q)
         for i, _ in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt(q[i : i + 4] @ q[i : i + 4])
@@ -218,7 +217,6 @@ class Scales(NamedTuple):
         return np.asarray((a - b if self.space is None else self.space.difference(a, b)) / self.q)
 
     def rates(self, q: Array, v: Array) -> Array:
-        """q' = N(q) v."""
         return v if self.space is None else self.space.rates(q, v)
 
     def speed(self, v: Array) -> float:

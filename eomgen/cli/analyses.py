@@ -160,7 +160,6 @@ def reactions(
 
 
 def _write_reactions(out: Path, module: Module, times: Any, result: Any) -> None:
-    """Histories of all components, a column each."""
     names = [f"{joint}.{component}" for joint in module.joint_names for component in COMPONENTS]
     flat = result.reshape(len(names), -1)
     with whole_file(out) as file:

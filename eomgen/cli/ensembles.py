@@ -113,7 +113,6 @@ def _even(end: float, count: int) -> list[float]:
 
 
 def _read(path: Path, module: Module) -> dict[str, list[float]]:
-    """The columns of a table of cases."""
     with TextIOWrapper(open_plain(path), newline="", encoding="utf-8-sig") as file:
         try:
             rows = [row for row in csv.reader(file) if row]
@@ -157,6 +156,5 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
 
 
 def _read_grid(options: tuple[str, ...]) -> dict[str, tuple[float, float, int]]:
-    """Low, high and count by name."""
     spans = parse_spans("--grid", options, "NAME=LOW:HIGH:COUNT", "theta=0:2*pi:73")
     return {name: (low, high, count or 0) for name, low, high, count in spans}

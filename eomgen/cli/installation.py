@@ -15,7 +15,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import click
 
@@ -28,9 +28,6 @@ from ..errors import EomgenError, at_odds, bad_file, no_such
 from ..expr.without_gc import timed
 from .options import NumberRange, verb
 from .output import MODEL, TOOLCHAIN, exit_code, lines_of, print_json, readable_size, say, show, stage
-
-if TYPE_CHECKING:
-    from ..toolchain.cache import Cache
 
 # -- doctor ------------------------------------------------------------------------------------------------------------
 
@@ -182,68 +179,43 @@ DAY = 86400.0
 MEGABYTE = 1_000_000
 
 
-def _cache() -> Cache:
+@verb()
+@click.argument("action", type=click.Choice(("list", "prune", "clear")), default="list")
+def cache(
+    action: str,
+    as_json: bool,
+    older_than: Annotated[float | None, NumberRange(min=0), "DAYS: Prune entries that were not used for DAYS."] = None,
+    max_size: Annotated[float | None, NumberRange(min=0), "MB: Prune the oldest entries until MB are left."] = None,
+) -> None:
+    """List the compiled modules, the most recently used first, prune those least recently used, or clear them all.
+
+    Without options those are pruned that were not used for 30 days.  EOMGEN_CACHE_DIR sets their folder.
+    """
     from ..toolchain.cache import Cache, cache_directory
 
-    return Cache(cache_directory())
-
-
-@verb()
-def listing(as_json: bool) -> None:
-    """List the compiled modules, the most recently used first."""
-    kept = _cache()
-    entries = kept.entries()
-    size = sum(entry.size for entry in entries)
-    keys = ("key", "kind", "name", "directory", "size", "created", "used")
-    values = {
-        "directory": kept.root,
-        "size": size,
-        "entries": [{key: getattr(e, key) for key in keys} for e in entries],
-    }
-    rows = [[e.name, e.kind, readable_size(e.size), _ago(e.used), e.key[:12]] for e in entries]
-    table = [ResultTable(["model", "kind", "size", "used", "key"], rows, right=[2, 3])] if rows else []
-    show(as_json, values, f"{kept.root}: {len(entries)} entries, {readable_size(size)}", *table, files=None)
-
-
-@verb()
-def prune(
-    as_json: bool,
-    older_than: Annotated[float | None, NumberRange(min=0), "DAYS: Remove entries that were not used for DAYS."] = None,
-    max_size: Annotated[float | None, NumberRange(min=0), "MB: Remove the oldest entries until MB are left."] = None,
-) -> None:
-    """Remove the modules least recently used; without options those not used for 30 days."""
-    if older_than is None and max_size is None:
-        older_than = 30.0
-    kept = _cache()
-    removed = kept.prune(
-        older_than=None if older_than is None else older_than * DAY,
-        max_size=None if max_size is None else int(max_size * MEGABYTE),
-    )
-    freed = sum(entry.size for entry in removed)
-    values = {"directory": kept.root, "removed": [entry.key for entry in removed], "freed": freed}
-    show(as_json, values, f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}", files=None)
-
-
-@verb()
-def clear(as_json: bool) -> None:
-    """Remove every compiled module."""
-    kept = _cache()
-    removed = kept.clear()
-    values = {"directory": kept.root, "removed": removed}
-    show(as_json, values, f"{kept.root}: removed {removed} entries", files=None)
-
-
-def cache() -> click.Group:
-    """The verb of these verbs."""
-
-    @click.group(commands={"list": listing(), "prune": prune(), "clear": clear()}, invoke_without_command=True)
-    @click.pass_context
-    def cache(ctx: click.Context) -> None:
-        """List, prune or clear the compiled modules; EOMGEN_CACHE_DIR sets their folder."""
-        if ctx.invoked_subcommand is None:
-            ctx.invoke(listing(), as_json=False)
-
-    return cache
+    if action != "prune" and (older_than, max_size) != (None, None):
+        raise at_odds(f"--older-than and --max-size are for prune; leave them out of {action}")
+    kept, table = Cache(cache_directory()), list[ResultTable]()
+    values: dict[str, Any] = {"directory": kept.root}
+    if action == "list":
+        entries, keys = kept.entries(), ("key", "kind", "name", "directory", "size", "created", "used")
+        size = sum(entry.size for entry in entries)
+        values |= {"size": size, "entries": [{key: getattr(e, key) for key in keys} for e in entries]}
+        rows = [[e.name, e.kind, readable_size(e.size), _ago(e.used), e.key[:12]] for e in entries]
+        table = [ResultTable(["model", "kind", "size", "used", "key"], rows, right=[2, 3])] if rows else []
+        said = f"{len(entries)} entries, {readable_size(size)}"
+    elif action == "prune":
+        days = 30.0 if older_than is max_size is None else older_than
+        removed = kept.prune(
+            older_than=None if days is None else days * DAY,
+            max_size=None if max_size is None else int(max_size * MEGABYTE),
+        )
+        values |= {"removed": [entry.key for entry in removed], "freed": sum(entry.size for entry in removed)}
+        said = f"removed {len(removed)} entries, {readable_size(values['freed'])}"
+    else:
+        values["removed"] = kept.clear()
+        said = f"removed {values['removed']} entries"
+    show(as_json, values, f"{kept.root}: {said}", *table, files=None)
 
 
 def _ago(moment: float) -> str:
@@ -283,9 +255,9 @@ def examples(
     With --all the exit code is that of the first example that fails.  docs/gallery.md shows them.
     """
     result = example_files()
+    if every and name is not None:
+        raise at_odds(f"--all runs every example; leave out {name} or --all")
     if every:
-        if name is not None:
-            raise at_odds(f"--all runs every example; leave out {name} or --all")
         _run_all(result, target, as_json)
         return
     if name is None:
@@ -301,36 +273,33 @@ def examples(
 
 def _run_all(result: dict[str, Path], target: str, as_json: bool) -> None:
     """Run all examples and leave with the exit code of the first that fails."""
-    start, runs = perf_counter(), list[ExampleRun]()
+    start, runs = perf_counter(), list[dict[str, Any]]()
     for key, file in result.items():
         with stage(key):
             runs.append(run_example(key, file, target))
-    failed = [run for run in runs if not run.ok]
+    failed = [run for run in runs if not run["ok"]]
     total = perf_counter() - start
-    entries = [{**run._asdict(), "ok": run.ok} for run in runs]
     header = ["example", "freedoms", "derive s", "compile s", "simulate s", "steps", "result"]
-    said = f"{len(failed)} of {len(runs)} failed: {', '.join(run.name for run in failed)}" if failed else "all ran"
+    said = f"{len(failed)} of {len(runs)} failed: {', '.join(run['name'] for run in failed)}" if failed else "all ran"
     show(
         as_json,
-        {"ok": not failed, "target": target, "seconds": total, "examples": entries},
-        ResultTable(header, [_row(run) for run in runs], right=range(1, 6)),
+        {"ok": not failed, "target": target, "seconds": total, "examples": runs},
+        ResultTable(header, [_row(**run) for run in runs], right=range(1, 6)),
         f"{said}, {total:.1f} s",
         files=None,
     )
     if failed:
-        sys.exit(failed[0].exit_code)
+        sys.exit(failed[0]["exit_code"])
 
 
-def _row(run: ExampleRun) -> list[str]:
-    def shown(value: float | None, digits: int) -> str:
-        return "" if value is None else f"{value:.{digits}f}"
-
-    times = [shown(run.seconds.get(part), 2) for part in ("derive", "compile", "simulate")]
-    if "script" in run.seconds:
-        times[2] = shown(run.seconds["script"], 2)
-    counts = [shown(run.degrees_of_freedom, 0), *times, shown(run.steps, 0)]
-    well = f"ok; {'; '.join(run.warnings)}" if run.warnings else "ok"
-    return [run.name, *counts, well if run.ok else f"exit code {run.exit_code}: {run.error}"]
+def _row(
+    name: str, degrees_of_freedom: int | None, steps: int | None, seconds: dict[str, float], **run: Any
+) -> list[str]:
+    times = [*map(seconds.get, ("derive", "compile")), seconds.get("script", seconds.get("simulate"))]
+    shown = ["" if s is None else f"{s:.2f}" for s in times]
+    counts = ["" if n is None else str(n) for n in (degrees_of_freedom, steps)]
+    result = "; ".join(["ok", *run["warnings"]]) if run["ok"] else f"exit code {run['exit_code']}: {run['error']}"
+    return [name, counts[0], *shown, counts[1], result]
 
 
 def _copy(name: str, result: dict[str, Path], force: bool) -> Path:
@@ -348,59 +317,40 @@ def _copy(name: str, result: dict[str, Path], force: bool) -> Path:
 PART = 0.1  #: of the time in the file that is simulated
 
 
-class ExampleRun(NamedTuple):
-    """What became of one example."""
+def run_example(name: str, file: Path, target: str) -> dict[str, Any]:
+    """What became of one example, as ``--json`` prints it.
 
-    name: str
-    file: str
-    exit_code: int  #: 0 where it ran; else the code with which a verb would have failed
-    error: str  #: first line of the failure
-    degrees_of_freedom: int | None  #: None of a Python script and of what failed before, as the next two
-    steps: int | None
-    end: float | None  #: until which time it was simulated (s)
-    seconds: dict[str, float]  #: ``derive``, ``compile`` and ``simulate``, or ``script``
-    warnings: list[str]  #: such as that a joint passed a limit
-
-    @property
-    def ok(self) -> bool:
-        return self.exit_code == 0
-
-
-def run_example(name: str, file: Path, target: str) -> ExampleRun:
-    """Run an example; what fails in it is told in the result."""
-    seconds: dict[str, float] = {}
-    result: dict[str, Any] = {"degrees_of_freedom": None, "steps": None, "end": None}
-    code, error = 0, ""
-    caught: list[warnings.WarningMessage] = []
-    try:
-        if file.suffix == ".py":
-            code, error = _run_script(file, seconds)
-        else:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                _run_model(file, target, seconds, result)
-    except (EomgenError, OSError) as failure:
-        code, error = exit_code(failure), lines_of(failure)[0]
-    except Exception as failure:  # a fault of eomgen itself is a result of this verb
-        code, error = MODEL, f"{type(failure).__name__}: {failure}"
-    return ExampleRun(
-        name, file.name, code, error, seconds=seconds, warnings=[str(w.message) for w in caught], **result
-    )
+    The ``exit_code`` is 0 where it ran, else that with which a verb would have failed, and ``error`` its first line;
+    it was simulated until ``end`` (s).  What a script does not have, and what failed, is None.
+    """
+    run: dict[str, Any] = {"name": name, "file": file.name, "exit_code": 0, "error": ""}
+    run |= {"degrees_of_freedom": None, "steps": None, "end": None, "seconds": {}}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            if file.suffix == ".py":
+                run["exit_code"], run["error"] = _run_script(file, run["seconds"])
+            else:
+                _run_model(file, target, run)
+        except (EomgenError, OSError) as failure:
+            run["exit_code"], run["error"] = exit_code(failure), lines_of(failure)[0]
+        except Exception as failure:  # a fault of eomgen itself is a result of this verb
+            run["exit_code"], run["error"] = MODEL, f"{type(failure).__name__}: {failure}"
+    return run | {"warnings": [str(w.message) for w in caught], "ok": run["exit_code"] == 0}
 
 
-def _run_model(file: Path, target: str, seconds: dict[str, float], result: dict[str, Any]) -> None:
+def _run_model(file: Path, target: str, run: dict[str, Any]) -> None:
     """Derive, compile and simulate a part of the time that the file asks for."""
     from ..api.loading import load
 
-    with timed(seconds, "derive"):
+    with timed(run["seconds"], "derive"):
         equations = load(file).derive()
-    result["degrees_of_freedom"] = equations.report.degrees_of_freedom
-    with timed(seconds, "compile"):
+    run["degrees_of_freedom"] = equations.report.degrees_of_freedom
+    with timed(run["seconds"], "compile"):
         module = equations.compile(target=target)
-    result["end"] = PART * float(module.info.simulation["end"])
-    with timed(seconds, "simulate"):
-        trajectory = module.simulate(result["end"])
-    result["steps"] = len(trajectory) - 1
+    run["end"] = PART * float(module.info.simulation["end"])
+    with timed(run["seconds"], "simulate"):
+        run["steps"] = len(module.simulate(run["end"])) - 1
 
 
 def _run_script(file: Path, seconds: dict[str, float]) -> tuple[int, str]:

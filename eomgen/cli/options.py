@@ -374,7 +374,6 @@ class Source:
         return equations
 
     def compile(self, method: str | None = None) -> Prepared:
-        """The module of the equations, and what ``--set`` sets."""
         equations = self.derive(method)
         with stage("compile") as parts:
             before = set(equations.seconds)
@@ -394,7 +393,6 @@ class Source:
             raise
 
     def show(self, values: Any, *parts: Result | ResultTable | str, files: Any = None) -> None:
-        """Print the values with --json, else the parts."""
         show(self.as_json, values, *parts, files=files)
 
 
@@ -409,11 +407,9 @@ class Prepared(NamedTuple):
     inputs: dict[str, float] | None
 
     def bound(self) -> Prepared:
-        """The same with parameters and inputs bound."""
         return self._replace(module=self.module.bind(self.parameters, self.inputs))
 
     def position(self) -> dict[str, float] | None:
-        """Initial values that are coordinates."""
         return {name: x for name, x in (self.initial or {}).items() if not name.endswith("_dot")} or None
 
     def show(self, t: float, *parts: Result | ResultTable | str, values: Any = None, files: Any = None) -> None:

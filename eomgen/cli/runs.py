@@ -113,7 +113,6 @@ def _final_names(trajectory: Trajectory) -> list[str]:
 
 
 def _run_to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance | None) -> dict[str, Any]:
-    """A run as plain values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     final = {name: trajectory[name][-1] for name in _final_names(trajectory)}
     return summary(equations) | {
@@ -172,43 +171,23 @@ def tables_of(
 
     ``uncounted`` are functions whose work is not known.
     """
-    header, residuals = trajectory.metadata, trajectory.residuals
-    if header["method"] == "moreau":
-        missed = header["missed_steps"]
-        rows = [
-            ("integrator", f"moreau, {header['steps']} steps of {header['options']['step']:g} s"),
-            ("contacts", f"{header['contacts']} at most in one step, {header['penetration']:.1e} m deep at most"),
-            ("laws of contact", f"residual {header['contact_residual']:.1e} m/s; {missed} steps miss the tolerance"),
-        ]
-    elif header["rtol"] is None:
-        rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
-    else:
-        rows = [
-            ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
-            ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
-        ]
-    if header["loop_names"] or residuals.raw_position:
-        rows += [
-            ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
-            ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
-        ]
+    from ..runtime.drawing import trajectory_facts
+
+    title, (*facts, _) = trajectory_facts(trajectory)  # without all columns
     points = trajectory.change_points
-    if points:
-        rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
-        rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
-    rows += _energy_rows(energy, uncounted)
+    more = [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
+    more += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
     names = _final_names(trajectory)
     units = [trajectory.units.get(name, "") for name in names]
     sizes = [float(max(trajectory[name].max(), -trajectory[name].min())) for name in names]
     final = without_noise([trajectory[name][-1] for name in names], units, sizes)
-    error, states = header["atol"] or 0.0, set(trajectory.x_names)
+    error, states = trajectory.metadata["atol"] or 0.0, set(trajectory.x_names)
     for k, name in enumerate(names):  # a state that rests, to the error that the integrator admits
         if name in states and abs(final[k]) <= error and sizes[k] <= RESTING * error:
             final[k] = 0.0
     values = [(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)]
-    start, end = trajectory.t[0], trajectory.t[-1]
-    run = ResultTable((), rows, f"simulation from {start:g} to {end:g} s")
-    return run, ResultTable((), values, f"values at t = {end:g} s")
+    run = ResultTable((), [*facts, *more, *_energy_rows(energy, uncounted)], title)
+    return run, ResultTable((), values, f"values at t = {trajectory.t[-1]:g} s")
 
 
 # -- kinematics --------------------------------------------------------------------------------------------------------
@@ -279,7 +258,6 @@ def _left(n: int) -> str:
 
 
 def _motion_to_dict(motion: KinematicAnalysis) -> dict[str, Any]:
-    """An analysis as plain values."""
     names = ("t", *_final_names(motion))
     return {
         "points": len(motion),

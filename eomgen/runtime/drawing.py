@@ -121,10 +121,17 @@ def trajectory_facts(trajectory: Any) -> tuple[str, list[tuple[str, str]]]:
     method = str(header.get("method"))
     if header.get("rtol") is not None:
         method += f", rtol {header['rtol']:.3g}, atol {header['atol']:.3g}, {trajectory.nfev} calls"
+    elif "missed_steps" in header:
+        method += f", {header['steps']} steps of {header['options']['step']:g} s"
     lines.append(("method", method))
+    if "missed_steps" in header:
+        worst = f"{header['contacts']} at most in one step, {header['penetration']:.1e} m deep at most"
+        missed = f"{header['missed_steps']} steps miss the tolerance"
+        lines += [("contacts", worst), ("laws", f"residual {header['contact_residual']:.1e} m/s; {missed}")]
     if header.get("loop_names") or trajectory.residuals.raw_position:
         kept = trajectory.residuals
-        lines.append(("loop residual", f"{kept.raw_position:.1e} raw, {kept.position:.1e} stored (m, rad)"))
+        lines.append(("loop residual", f"{kept.raw_position:.1e} raw, {kept.position:.1e} projected (m, rad)"))
+        lines.append(("of velocities", f"{kept.raw_velocity:.1e} raw, {kept.velocity:.1e} projected"))
     counts = [(name, len(times)) for name, times in zip(trajectory.t_events.names, trajectory.t_events, strict=True)]
     if counts:
         lines.append(("events", listed([f"{name}: {count}" for name, count in counts])))

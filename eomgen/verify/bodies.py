@@ -34,7 +34,6 @@ class Twist(NamedTuple):
 
     @property
     def moves(self) -> bool:
-        """Whether it is not rest."""
         return any(self.angular) or any(self.linear)
 
     def at(self, arm: Numbers) -> Numbers:
@@ -78,7 +77,6 @@ class Rigid(NamedTuple):
         return self.mass * a, self.inertia @ rate.angular + cross(omega, self.inertia @ omega)
 
     def product(self, w: Twist, z: Twist) -> Number:
-        """m v(w) . v(z) + omega(w) . J omega(z)."""
         return self.mass * (w.at(self.arm) @ z.at(self.arm)) + w.angular @ (self.inertia @ z.angular)
 
 

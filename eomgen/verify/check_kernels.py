@@ -265,7 +265,6 @@ def _tangent(model: CheckedModel, truth: Truth, rng: np.random.Generator) -> tup
 
 
 def _line(truth: Truth, w: Array, change: Array) -> Callable[[Number], Values]:
-    """The state moved by s along w and change."""
     terms, exact = truth.system.terms, truth.system.exact
     dq, dv = exact(w) @ truth.columns, exact(change)
     return lambda s: truth.values | truth.moved(terms.q, s * dq) | truth.moved(terms.v, s * dv)

@@ -55,12 +55,10 @@ class CheckedModel:
 
     @cached_property
     def truths(self) -> list[Truth]:
-        """The first states, in many digits."""
         return [Truth(self.system, case) for case in self.states[:DEEP]]
 
     @cached_property
     def symbols(self) -> dict[str, Array]:
-        """Values of all symbols at all states."""
         terms, states = self.terms, self.states
         names = (*terms.q, *terms.v, *terms.a, *terms.p, *terms.u, terms.t)
         rows = np.array([[*c.x, *c.a, *c.p, *c.u, c.t] for c in states])
@@ -80,7 +78,6 @@ class CheckedModel:
         return np.asarray(kernels.kernel(kernel, kind="state")(case.q if takes == ("q",) else case.x, **case.timed))
 
     def rhs(self, case: SystemState) -> Array:
-        """x'."""
         return self.module.rhs(case.t, case.x, **case.values)
 
     # -- the straight-line kernels and what they are on the graph -----------------------------------------------------
@@ -93,7 +90,6 @@ class CheckedModel:
 
     # -- labels -------------------------------------------------------------------------------------------------------
     def labels(self, kernel: str) -> list[str]:
-        """What the entries of a kernel's result are called."""
         layout = self.layout
         table: dict[str, Sequence[Sequence[str]]] = {
             "rhs": [[f"{n}'" for n in layout.x]],

@@ -99,7 +99,6 @@ class Digits:
                 self._steps.append((None, call, tuple(slot[k] for k in args)))
 
     def __call__(self, values: Mapping[str, Number]) -> Numbers:
-        """Values of the outputs."""
         data: list[Number] = []
         for name, operation, args in self._steps:
             if name is not None:

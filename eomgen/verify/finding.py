@@ -189,7 +189,6 @@ class Comparison:
             self._worst = figure, float(allowed[k]) / unit, f"{place}state {number}"
 
     def finding(self) -> Finding:
-        """What was found; left out where rounding gives no entry a finite limit."""
         if self._share < 0.0 and self._unlimited:
             return Finding.skipped(self.check, NO_LIMIT)
         worst, limit, where = self._worst

@@ -45,12 +45,10 @@ class SystemState(NamedTuple):
 
     @property
     def q(self) -> Array:
-        """Coordinates."""
         return self.x[: self.n_q]
 
     @property
     def v(self) -> Array:
-        """Velocities."""
         return self.x[self.n_q :]
 
     @property
@@ -129,7 +127,6 @@ def _geometric(module: BoundModel, rng: np.random.Generator) -> Array:
 
 
 def _state(module: BoundModel, rng: np.random.Generator, t: float, p: Array, u: Array) -> Array | None:
-    """A closed state that can be evaluated, or None."""
     layout = module.layout
     q_kinds = layout.coordinate_kinds
     shift = rng.standard_normal(module.n_q) * np.array([LENGTH if kind == "length" else ANGLE for kind in q_kinds])

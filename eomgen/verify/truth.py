@@ -55,7 +55,6 @@ class PreciseSystem:
         return array([self.mp.mpf(float(x)) for x in values])
 
     def values(self, case: SystemState) -> Values:
-        """All symbols at a case."""
         terms = self.terms
         names = (*terms.q, *terms.v, *terms.a, *terms.p, *terms.u, terms.t)
         return dict(zip(names, self.exact((*case.x, *case.a, *case.p, *case.u, case.t)), strict=True))
@@ -78,7 +77,6 @@ class Truth:
         self.v = self.of(system.terms.v)
 
     def of(self, names: Sequence[str], values: Values | None = None) -> Numbers:
-        """Values by name."""
         values = self.values if values is None else values
         return array([values[name] for name in names])
 
@@ -98,11 +96,9 @@ class Truth:
         return array([self.rates(still | {name: one}) - base for name in self.system.terms.v])
 
     def moved(self, names: Sequence[str], changes: Numbers) -> Values:
-        """Values by name with changes added."""
         return dict(zip(names, self.of(names) + changes, strict=True))
 
     def displaced(self, j: int, step: Number) -> Values:
-        """The coordinates moved along velocity j."""
         return self.values | self.moved(self.system.terms.q, step * self.columns[j])
 
     def later(self, step: Number, a: Numbers | None = None, frozen: bool = False) -> Values:
@@ -146,7 +142,6 @@ class Truth:
         return self.slope(self.rates, along)
 
     def slope(self, f: Callable[[Values], Numbers], along: Callable[[Number], Values]) -> Numbers:
-        """Central difference of a function along a way."""
         h = self.mp.mpf(FIRST)
         result: Numbers = (f(along(h)) - f(along(-h))) / (2 * h)
         return result
@@ -159,17 +154,14 @@ class Truth:
 
     # -- bodies -------------------------------------------------------------------------------------------------------
     def poses(self, values: Values) -> list[Pose]:
-        """Where the bodies are."""
         return bodies.poses_of(self.system.evaluate("poses", lambda: self.system.terms.poses, values))
 
     @cached_property
     def here(self) -> list[Pose]:
-        """Where the bodies are at the case."""
         return self.poses(self.values)
 
     @cached_property
     def bodies(self) -> list[Rigid]:
-        """The bodies as they were described, at the case."""
         mechanism = self.system.mechanism
         numbers = self.system.evaluate("described", lambda: bodies.described(mechanism), self.values)
         return bodies.rigid_bodies(numbers, self.here)
@@ -186,7 +178,6 @@ class Truth:
 
     @cached_property
     def twists(self) -> list[Twist]:
-        """Twists of the bodies in the motion."""
         return self._moving()[0]
 
     def _moving(self, a: Numbers | None = None) -> tuple[list[Twist], list[Twist]]:
@@ -197,13 +188,11 @@ class Truth:
         return [bodies.difference(*x, h) for x in ends], [bodies.second_difference(*x, h) for x in ends]
 
     def body_rates(self, a: Numbers | None = None) -> list[Twist]:
-        """Angular accelerations and accelerations of the origins."""
         return self._moving(a)[1]
 
     # -- forces -------------------------------------------------------------------------------------------------------
     @cached_property
     def gravity(self) -> Numbers:
-        """Acceleration of gravity, ground axes."""
         return self.system.evaluate("gravity", lambda: self.system.mechanism.gravity, self.values)
 
     def measured(self, values: Values) -> Numbers:
@@ -243,7 +232,6 @@ class Truth:
         ]
 
     def coordinate_loads(self, remainder: bool = False) -> list[tuple[str, Number]]:
-        """Generalized forces along joint coordinates."""
         loads = [
             load
             for terms in self.system.kinematics.forces
@@ -278,7 +266,6 @@ class Truth:
     # -- equations of motion of the tree ------------------------------------------------------------------------------
     @cached_property
     def mass_matrix(self) -> Numbers:
-        """M of the tree."""
         mechanism = self.system.mechanism
         if mechanism.lagrangian is not None:
             return self._lagrangian_mass()
@@ -352,7 +339,6 @@ class Truth:
 
     # -- constraints --------------------------------------------------------------------------------------------------
     def holonomic(self, values: Values) -> Numbers:
-        """C."""
         return self.system.evaluate("constraints", lambda: self.system.terms.constraints, values)
 
     def rate_rows(self, values: Values) -> Numbers:

@@ -113,7 +113,6 @@ def _made(mechanism: Mechanism, method: str) -> BoundModel:
 
 
 def _own(model: CheckedModel) -> Mechanism:
-    """The mechanism in a graph of its own."""
     return copied(model.mechanism)
 
 
@@ -150,7 +149,6 @@ def _turned(model: CheckedModel, seed: int) -> BoundModel:
 
 
 def _point(place: Frame, at: Vec3) -> Vec3:
-    """A point in the new axes."""
     return vec.transpose_times(place.rotation, vec.sub(at, place.position))
 
 

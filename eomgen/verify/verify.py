@@ -93,7 +93,6 @@ def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
 
 
 def _of_module(module: BoundModel, states: int, seed: int, end: float) -> list[Finding]:
-    """What the module says of itself, and what follows from its equations."""
     if not module.n_x:
         return _of_fixed_bodies(module)
     random = random_states(module, states, seed)
@@ -109,7 +108,6 @@ def _of_module(module: BoundModel, states: int, seed: int, end: float) -> list[F
 
 
 def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
-    """Of a model without coordinates: its poses."""
     R = module.poses(np.empty(0))[:, :3, :3]
     worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
     why = "the model has no coordinate: its bodies are fixed to ground"

@@ -71,10 +71,9 @@ def test_every_verb_explains_itself_and_its_own_options_first(call: Call, verb: 
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith(f"Usage: eomgen {verb}")
     assert max(map(len, result.out.splitlines())) <= 120
-    if verb != "cache":
-        own = result.out.partition("\nOptions:\n")[2].partition("\n\n")[0]
-        assert "--method" not in own
-        assert own.rstrip().endswith("Show this message and exit.")
+    own = result.out.partition("\nOptions:\n")[2].partition("\n\n")[0]
+    assert "--method" not in own
+    assert own.rstrip().endswith("Show this message and exit.")
 
 
 #: What is wrong on a command line -> what is said; all of it ends with 2, or the code in front.
