@@ -14,11 +14,11 @@ from ..base.algebra import Array
 from ..base.results import Result, ResultTable, same_keys
 from ..errors import ProjectionError, cannot, ill_shaped, off_range
 from ..runtime.argument_checks import check_names, read_names, read_number, read_numbers
+from ..runtime.constrained import free_motions
 from ..runtime.refusals import require_support
 from .limits import EFFECT, IDENTIFIED, LINEAR, MEASURED, ROUNDED_COEFFICIENT, ROUNDS
 from .regressor import (
     STANDARD,
-    free_directions,
     inertial_remainder,
     random_states,
     regressor,
@@ -458,16 +458,14 @@ def _independent(W: Array, sizes: Array, least: float) -> tuple[list[int], float
 
 def _observe(module: BoundModel, random: np.random.Generator, count: int) -> Array:
     """The regressor at random states, one row for each direction of motion, in units of one kind."""
-    layout, s = module.layout, module.layout.scales.q
+    scales = module.layout.scales
     q, v, a = random_states(module, random, count)
-    Y = regressor(module, q, v, a) * s[:, None, None]
-    if layout.n_c:
+    W = np.moveaxis(regressor(module, q, v, a), -1, 0)
+    if module.layout.n_c:
         C_q = np.moveaxis(np.asarray(module.constraint_jacobian(q, rows="all")), -1, 0)
-        free = [free_directions(layout.scales.jacobian(C)) for C in C_q]
-        rows = [f.T @ y for f, y in zip(free, np.moveaxis(Y, -1, 0), strict=True)]
+        W = np.concatenate([free_motions(C, scales).T @ y for C, y in zip(C_q, W, strict=True)])
     else:
-        rows = list(np.moveaxis(Y, -1, 0))
-    W = np.concatenate(rows)
+        W = (scales.q[:, None] * W).reshape(-1, W.shape[-1])
     W = W[np.isfinite(W).all(axis=1)]
     if not len(W):
         raise ProjectionError(f"model {module.name!r} has no finite regressor at any of {count} random states")

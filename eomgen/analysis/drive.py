@@ -289,19 +289,25 @@ def _effects(states: ProjectedStates, names: Sequence[str]) -> tuple[Array, Arra
     module, layout = states.module, states.module.layout
     count = len(states.t)
     S, base = np.zeros((layout.n_v, len(names), count)), np.zeros(len(names))
-    loops = None
     for i, name in enumerate(names):
-        if name in layout.velocity_labels:
-            S[layout.velocity_labels.index(name), i] = 1.0
-        elif name in layout.loops:
-            if loops is None:
-                loops = states.evaluate(module.kernels.loop_coordinate_jacobian, states.q)
-            S[:, i] = loops[layout.loops.index(name)]
+        if name in layout.velocity_labels + layout.loops:
+            S[:, i] = coordinate_slopes(states, name)
         else:
             j = layout.u.index(name)
             base[i] = module.u[j]
             S[:, i] = _input_effect(states, j)
     return S, base
+
+
+def coordinate_slopes(states: ProjectedStates, name: str) -> Array:
+    """The rate (n_v, k) of a coordinate of the tree or of a cut joint in a unit of each velocity."""
+    layout = states.module.layout
+    if name in layout.loops:
+        every = states.evaluate(states.module.kernels.loop_coordinate_jacobian, states.q)
+        return np.asarray(every[layout.loops.index(name)])
+    result = np.zeros((layout.n_v, len(states.t)))
+    result[layout.velocity_labels.index(name)] = 1.0
+    return result
 
 
 def _input_effect(states: ProjectedStates, j: int) -> Array:

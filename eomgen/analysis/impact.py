@@ -38,6 +38,7 @@ from ..runtime.runs.run_arguments import find_state, set_up
 from ..runtime.runs.simulate import simulate
 from ..runtime.storage import Stored
 from ..runtime.trajectory import Span, Start, Trajectory
+from .drive import coordinate_slopes
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -239,21 +240,9 @@ def _strike_gaps(
     rates = gaps.rates(t, x, rows)
     sliding = find_sliding(gaps.module, rough, gaps.names, t, x, gaps.forcing)
     if locked:
-        held = _locks(states, locked)
+        held = np.array([coordinate_slopes(states, name)[:, 0] for name in locked])
         rows, rates = np.vstack([rows, held]), np.concatenate([rates, held @ states.v[:, 0]])
     return apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked), sliding)
-
-
-def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
-    layout = states.module.layout
-    rows = np.zeros((len(names), layout.n_v))
-    for i, name in enumerate(names):
-        if name in layout.velocity_labels:
-            rows[i, layout.velocity_labels.index(name)] = 1.0
-        else:
-            every = states.evaluate(states.module.kernels.loop_coordinate_jacobian, states.q)
-            rows[i] = every[layout.loops.index(name), :, 0]
-    return rows
 
 
 # -- the trajectory ----------------------------------------------------------------------------------------------------

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import algebra
 from ..base.algebra import Array
-from ..base.limits.constraints import STATE as RANK
 from ..errors import EvaluationError, ProjectionError, cannot, ill_shaped
 from ..runtime.argument_checks import read_numbers, read_vector
+from ..runtime.constrained import free_motions
 from ..runtime.kernels import into
 from ..runtime.refusals import require_support
 
@@ -57,9 +56,9 @@ def _on_constraints(module: BoundModel, random: np.random.Generator, rate: float
     n_q, scales = module.n_q, layout.scales
     q = scales.move(layout.q_reference, np.pi * random.uniform(-1.0, 1.0, module.n_v))
     x = module.project(np.concatenate([q, rate * scales.q * random.normal(size=module.n_v)]))
-    free = free_directions(scales.jacobian(module.constraint_jacobian(x[:n_q], rows="all")))
+    free = free_motions(module.constraint_jacobian(x[:n_q], rows="all"), scales)
     own = module.rhs(0.0, x)[n_q:]  # keeps the constraints, as does every change along what they leave free
-    return x, own + scales.q * (free @ (rate * rate * random.normal(size=free.shape[1])))
+    return x, own + free @ (rate * rate * random.normal(size=free.shape[1]))
 
 
 def _rate(module: BoundModel) -> float:
@@ -68,12 +67,6 @@ def _rate(module: BoundModel) -> float:
     terms = module.kernels.inertial_terms(module.layout.q_reference, still, still)
     fall = float(np.linalg.norm(terms[:, 9:12], axis=1).max())
     return float(np.sqrt(fall / module.layout.length)) if fall > 0.0 else 1.0
-
-
-def free_directions(J: Array) -> Array:
-    """Directions of scaled velocities that constraints leave, as orthonormal columns."""
-    _, sizes, Vt = algebra.svd(J)
-    return Vt[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
 
 
 # -- regressor ---------------------------------------------------------------------------------------------------------

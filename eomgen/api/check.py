@@ -27,12 +27,7 @@ OF_OUTPUTS = ("motion_outputs", "output_derivatives", "inertial_terms")
 
 @np.errstate(all="ignore")
 def check(model: Builder) -> MechanismReport:
-    """Everything that can be wrong with a model before code is generated.
-
-    Raises
-    ------
-    ModelError, AssemblyError
-    """
+    """Everything that can be wrong with a model before code is generated."""
     equations = derive(Derivation, model)
     equations.kinematics.mechanism.require_values()
     unbalanced = require_inertia(equations.kinematics, equations.mobility, equations.tree)

@@ -35,12 +35,7 @@ def as_path(what: str, raw: Any) -> Path:
 
 
 def as_name(what: str, raw: Any) -> str:
-    """The same as text, as it was written.
-
-    Raises
-    ------
-    UsageError
-    """
+    """The same as text, as it was written."""
     name = usable_name(raw)
     if name is None:
         raise ill_typed(f"{what} must be the name of a file or folder, as text or Path, not {shown(raw)}")

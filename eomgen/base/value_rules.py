@@ -83,12 +83,7 @@ MOST = 10**15  #: all whole numbers up to here are doubles, and their products w
 
 
 def read_count(what: str, raw: Any, least: int = 0, most: int | None = None) -> int:
-    """A whole number within limits.
-
-    Raises
-    ------
-    UsageError
-    """
+    """A whole number within limits."""
     result = as_count(raw)
     if result is None or result < least or result > (MOST if most is None else most):
         endless = most is None and (result is None or result < least)

@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 
 def require_plotting(file: Path, option: str = "--plot") -> None:
-    """Fail before the work if there is nothing to draw with, or no such kind of picture.
-
-    Raises
-    ------
-    MissingDependencyError, UsageError
-    """
+    """Fail before the work if there is nothing to draw with, or no such kind of picture."""
     try:
         from matplotlib.backend_bases import FigureCanvasBase
     except ImportError as error:
@@ -65,12 +60,7 @@ class Picture:
 
 
 def check_picture(file: Path | None, picture: Picture) -> None:
-    """Fail before the work if nothing can be drawn, or if it is said what to draw and not where.
-
-    Raises
-    ------
-    MissingDependencyError, UsageError
-    """
+    """Fail before the work if nothing can be drawn, or if it is said what to draw and not where."""
     if file is not None:
         require_plotting(file)
     elif picture != Picture():
@@ -78,12 +68,7 @@ def check_picture(file: Path | None, picture: Picture) -> None:
 
 
 def check_columns(module: Module, picture: Picture) -> None:
-    """Fail before a run if it will have no column of a name.
-
-    Raises
-    ------
-    UsageError
-    """
+    """Fail before a run if it will have no column of a name."""
     from ..runtime.argument_checks import check_names
     from ..runtime.columns import column_names
 

@@ -43,12 +43,7 @@ def numbers(values: Any) -> Array:
 
 
 def context() -> Any:
-    """Arithmetic of mpmath with :data:`DIGITS`, apart from that of the user.
-
-    Raises
-    ------
-    MissingDependencyError
-    """
+    """Arithmetic of mpmath with :data:`DIGITS`, apart from that of the user."""
     try:
         from mpmath import MPContext  # type: ignore[import-untyped]
     except ImportError:
@@ -64,10 +59,6 @@ class Digits:
 
     A function that is declared from outside is known in doubles only.  It is taken as its Taylor polynomial of second
     order about the arguments of the first evaluation at a state, so that differences see a smooth function.
-
-    Parameters
-    ----------
-    outputs : sequence of Expr
     """
 
     def __init__(self, mp: Any, outputs: Sequence[Expr]) -> None:
