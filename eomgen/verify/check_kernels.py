@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array
+from ..base.kernel_table import NAMED
 from ..base.limits.numbers import EPS, TINY
 from .checked import CheckedModel
 from .digits import FOLDED, UNIT, Number, Numbers, array, bounded, numbers
@@ -78,7 +79,7 @@ def _batches(model: CheckedModel) -> Finding:
         outputs = list(model.graph_kernels[name]())
         bounds = bounded(outputs, symbols, COLUMNS)[1]
         kernel = module.kernels.kernel(name, kind="state")
-        states = x if KERNEL_STATES[name] == "x" else q
+        states = q if NAMED[name].inputs == ("q",) else x
         batch = np.asarray(kernel(states, **case.timed)).reshape(-1, COLUMNS)
         for k in range(COLUMNS):
             single = np.asarray(kernel(np.ascontiguousarray(states[:, k]), **case.timed)).ravel()
@@ -86,16 +87,6 @@ def _batches(model: CheckedModel) -> Finding:
             result.add(0, batch[:, k] - single, 2.0 * bounds[:, k], terms_size(single, bounds[:, k]), labels)
     result.states_compared = 1
     return result.finding()
-
-
-KERNEL_STATES = {
-    "mass_matrix": "q",
-    "bias": "x",
-    "energy": "x",
-    "poses": "q",
-    "constraints": "q",
-    "constraint_jacobian": "q",
-}
 
 
 def _digits(model: CheckedModel) -> Finding:

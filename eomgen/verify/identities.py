@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: hundred products.  Checks that know the graph have bounds of their own.
 KERNEL = 256.0 * EPS
 
-Check = Callable[["BoundModel", Sequence[SystemState]], Finding]
+Check = Callable[[str, "BoundModel", Sequence[SystemState]], Finding]
 
 
 def identities(module: BoundModel, states: Sequence[SystemState]) -> list[Finding]:
@@ -40,7 +40,7 @@ def identities(module: BoundModel, states: Sequence[SystemState]) -> list[Findin
             result.append(Finding.skipped(name, "the model is for kinematics only"))
             continue
         try:
-            result.append(check(module, states))
+            result.append(check(name, module, states))
         except EomgenError as error:
             result.append(failed(name, error))
     return result
@@ -56,9 +56,8 @@ def jacobian_at(module: BoundModel, c: SystemState) -> Array:
     return module.kernels.constraint_jacobian(c.q, **c.timed)[module.layout.rows]
 
 
-def _definite(module: BoundModel, states: Sequence[SystemState]) -> Finding:
+def _definite(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
-    check = "embedded_mass_matrix: symmetric, positive definite"
     if not module.layout.n_dof or module.layout.general_rates:
         return Finding.skipped(
             check, "there is no degree of freedom" if not module.layout.n_dof else "equations are given"
@@ -74,8 +73,7 @@ def _definite(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     return result.finding()
 
 
-def _kinetic(module: BoundModel, states: Sequence[SystemState]) -> Finding:
-    check = "energy: T = v M v / 2"
+def _kinetic(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
     if not module.n_bodies:
         return Finding.skipped(check, "there are no bodies")
     result = Comparison(check)
@@ -87,8 +85,8 @@ def _kinetic(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     return result.finding()
 
 
-def _inverse(module: BoundModel, states: Sequence[SystemState]) -> Finding:
-    result = Comparison("inverse_dynamics: M a + h")
+def _inverse(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
+    result = Comparison(check)
     for c in states:
         M, h = mass_at(module, c), module.kernels.bias(c.t, c.x, **c.values)
         expected = module.kernels.inverse_dynamics(c.q, c.v, c.a, **c.timed)
@@ -102,9 +100,8 @@ def _rates(module: BoundModel, q: Array, v: Array) -> Array:
     return v if space is None else space.rates(q, v)
 
 
-def _slopes(module: BoundModel, states: Sequence[SystemState]) -> Finding:
+def _slopes(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """C_q N of each velocity; C of Euler parameters off their unit length is a function like any other."""
-    check = "constraint_jacobian: extrapolated differences"
     if not module.n_rows or module.layout.general_rates:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
     result, n_h = Comparison(check), module.layout.n_h
@@ -123,9 +120,9 @@ def _along_q(module: BoundModel, c: SystemState, way: Array) -> Callable[[float]
     return lambda s: module.constraints(c.q + s * way, **c.timed, rows="all")
 
 
-def _projection(module: BoundModel, states: Sequence[SystemState]) -> Finding:
+def _projection(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """Projected twice is projected once; loops are closed there, and at ``x0``."""
-    result, scales = Comparison("project: idempotent, closes loops, keeps x0"), module.layout.scales
+    result, scales = Comparison(check), module.layout.scales
     for c in states:
         x = module.project(c.x, t=c.t, **c.values)
         again = module.project(x, t=c.t, **c.values)
@@ -137,9 +134,9 @@ def _projection(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     return result.finding()
 
 
-def _balance(module: BoundModel, states: Sequence[SystemState]) -> Finding:
+def _balance(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """B^T (M a + h) = 0, B the motions that the constraints leave (their null space by singular values)."""
-    result = Comparison("rhs: forces in balance along free motions")
+    result = Comparison(check)
     for c in states:
         a = module.rhs(c.t, c.x, **c.values)[module.n_q :]
         M, h, C = mass_at(module, c), module.kernels.bias(c.t, c.x, **c.values), jacobian_at(module, c)
@@ -167,9 +164,8 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
     return float(own * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
-def _holding(module: BoundModel, states: Sequence[SystemState]) -> Finding:
+def _holding(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
     """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
-    check = "rhs: constraints stay satisfied"
     if not module.n_rows or not module.layout.projects:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
     result = Comparison(check)
@@ -195,8 +191,8 @@ def _along_x(module: BoundModel, c: SystemState, rate: Array, time_scale: float)
     return f
 
 
-def _minimal(module: BoundModel, states: Sequence[SystemState]) -> Finding:
-    check, layout = "minimal: the same accelerations", module.layout
+def _minimal(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
+    layout = module.layout
     try:
         layout.require_minimal_form()
     except EomgenError:
@@ -218,7 +214,7 @@ def _minimal(module: BoundModel, states: Sequence[SystemState]) -> Finding:
     return result.finding()
 
 
-#: Name -> check; the name is what a check that raises is told by.
+#: Name -> check.
 CHECKS: dict[str, Check] = {
     "embedded_mass_matrix: symmetric, positive definite": _definite,
     "energy: T = v M v / 2": _kinetic,
