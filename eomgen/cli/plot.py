@@ -11,7 +11,7 @@ import numpy as np
 from ..base.files import save_figure
 from ..errors import MissingDependencyError, bad_file, incomplete
 from ..expr.notation import Notation
-from .options import OPTIONS, Names
+from .options import OPTIONS, Names, require_folder
 
 if TYPE_CHECKING:
     from ..model.mechanism import Mechanism
@@ -47,10 +47,12 @@ def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """What is to be drawn of a run: columns, over what, and of which kind."""
+class Output:
+    """What is written of a run or of a kinematic analysis: all columns, and a picture of some."""
 
     SECTION: ClassVar = OPTIONS
+    out: Annotated[Path | None, "FILE: Write all columns to FILE.npz, .csv, .nc or .parquet."] = None
+    plot: Annotated[Path | None, "FILE: Draw them, e.g. to FILE.png."] = None
     columns: Annotated[Names, "NAME: Columns that --plot draws, separated by commas; all coordinates by default."] = ()
     against: Annotated[str | None, "NAME: Column for the horizontal axis, instead of time."] = None
     plot_as: Annotated[
@@ -58,49 +60,55 @@ class Picture:
         "What --plot draws: columns over time, phase portraits, energy, residuals or a spectrum.",
     ] = "time"
 
+    @property
+    def plain(self) -> bool:
+        """Whether the picture is of all coordinates and of the paths of points."""
+        return (self.columns, self.against, self.plot_as) == ((), None, "time")
 
-def check_picture(file: Path | None, picture: Picture) -> None:
-    """Fail before the work if nothing can be drawn, or if it is said what to draw and not where."""
-    if file is not None:
-        require_plotting(file)
-    elif picture != Picture():
-        raise incomplete("--columns, --against and --plot-as need --plot FILE; give it too")
+    def check(self) -> None:
+        """Fail before the work if a file cannot be written, or if it is said what to draw and not where."""
+        if self.out is not None:
+            from ..runtime.storage import RUNS  # which takes as long to import as all verbs
+
+            if self.out.suffix not in RUNS:
+                raise bad_file(f"--out {self.out}: a run is written as {' or '.join(RUNS)}")
+        if self.plot is not None:
+            require_plotting(self.plot)
+        elif not self.plain:
+            raise incomplete("--columns, --against and --plot-as need --plot FILE; give it too")
+        require_folder("--out", self.out)
+        require_folder("--plot", self.plot)
+
+    def check_columns(self, module: Module) -> None:
+        """Fail before a run if it will have no column of a name."""
+        from ..runtime.argument_checks import check_names
+        from ..runtime.columns import column_names
+
+        known = ("t", *column_names(module.layout))
+        check_names("column", map(module.layout.plain, filter(None, (*self.columns, self.against))), known)
+
+    def write(self, mechanism: Mechanism, trajectory: Trajectory) -> list[Path]:
+        """The files written."""
+        if self.out is not None:
+            trajectory.save(self.out)
+        if self.plot is not None:
+            plot_run(trajectory, find_paths(mechanism), self.plot, self)
+        return [file for file in (self.out, self.plot) if file is not None]
 
 
-def check_columns(module: Module, picture: Picture) -> None:
-    """Fail before a run if it will have no column of a name."""
-    from ..runtime.argument_checks import check_names
-    from ..runtime.columns import column_names
-
-    known = ("t", *column_names(module.layout))
-    check_names("column", map(module.layout.plain, filter(None, (*picture.columns, picture.against))), known)
-
-
-def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, file: Path, picture: Picture) -> None:
-    """Draw a run or a kinematic analysis and write the picture; the suffix of ``file`` says its format.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    paths : list of (str, str)
-        Pairs of columns to draw against each other, beside the coordinates over time.
-    title : str
-    file : Path
-        Its folder is made if need be.
-    picture : Picture
-        What was asked for; without wishes all coordinates and the paths are drawn.
-    """
+def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], file: Path, wanted: Output) -> None:
+    """Draw a run or a kinematic analysis, with pairs of columns against each other beside the coordinates over time."""
     from matplotlib.figure import Figure
 
     from ..runtime.plotting import Curves, choose, draw_panel, height, refined, stack
 
     led = trajectory.metadata.get("led", ())
-    own = picture == Picture()
-    over = led[0] if own and led and not np.ptp(trajectory.t) else picture.against
-    names = picture.columns
+    own = wanted.plain
+    over = led[0] if own and led and not np.ptp(trajectory.t) else wanted.against
+    names = wanted.columns
     if own:
         names = tuple(n for n in (*trajectory.metadata["q_names"], *trajectory.metadata["loop_names"]) if n != over)
-    panels, across = choose(trajectory, names, over, None, picture.plot_as)
+    panels, across = choose(trajectory, names, over, None, wanted.plot_as)
     paths = paths if own else []
     size = (8.2 + 4.4 * bool(paths), max(3.2, sum(map(height, panels)) + 0.9))
     figure = Figure(figsize=size, layout="constrained", dpi=120)
@@ -116,5 +124,5 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
         curves = [(f"({printed(a)}, {printed(b)})", columns[a], columns[b]) for a, b in paths]
         draw_panel(plane, Curves("", curves, equal=True), below=True)
         plane.set_title("paths (m)", fontsize="medium")
-    figure.suptitle(title, parse_math=False)
+    figure.suptitle(trajectory.name, parse_math=False)
     save_figure(figure, file)

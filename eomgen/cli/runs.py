@@ -12,10 +12,10 @@ import numpy as np
 from ..analysis.linearization import without_noise
 from ..base.limits.numbers import RESTING
 from ..base.results import ResultTable
-from ..errors import ModelError, ToolchainError, at_odds, bad_file, ill_shaped, incomplete
+from ..errors import ModelError, ToolchainError, at_odds, ill_shaped, incomplete
 from .options import WANTED, End, Integration, Names, Positive, Source, Span, Texts, parse_spans, require_folder, verb
 from .output import after_integration, operations_of, say, stage, summary
-from .plot import Picture, check_columns, check_picture, find_paths, plot_run
+from .plot import Output
 
 if TYPE_CHECKING:
     from ..api.equations import Equations
@@ -36,18 +36,16 @@ CONTACT = ("contacts", "contact_iterations", "contact_residual", "missed_steps",
 @verb((*WANTED, "baumgarte"))
 def run(
     source: Source,
-    picture: Picture,
+    output: Output,
     solver: Integration,
     end: End = None,
-    out: Annotated[Path | None, "FILE: Write the run to FILE.npz, .csv, .nc or .parquet."] = None,
-    plot: Annotated[Path | None, "FILE: Draw the run, e.g. to FILE.png."] = None,
     animate: Annotated[Path | None, "FILE: Write an animation: FILE.gif, FILE.mp4 or FILE.html."] = None,
 ) -> None:
     """Derive, compile and simulate a model, and report the run.
 
     Integrator, tolerances, end time and initial values are those of the model file unless an option sets them.
     """
-    _check_files(out, plot, picture)
+    output.check()
     require_folder("--animate", animate)
     if animate is not None:
         from ..show.writers import require_kind
@@ -55,7 +53,7 @@ def run(
         require_kind(animate)
     work = source.compile()
     equations, module = work.equations, work.module
-    check_columns(module, picture)
+    output.check_columns(module)
     from .energy import MOREAU, Power, balance_energy
 
     power = Power(equations)
@@ -67,42 +65,20 @@ def run(
             initial=work.initial,
             parameters=work.parameters,
             inputs=work.inputs,
-            dense_output=not impulses and (plot is not None or animate is not None or power.counts),
+            dense_output=not impulses and (output.plot is not None or animate is not None or power.counts),
             **solver.keywords,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
     with after_integration():
         energy = balance_energy(power, trajectory)
-        files = _write(equations, trajectory, out, plot, picture)
+        files = output.write(equations.kinematics.mechanism, trajectory)
         if animate is not None:
             with stage("animate"):
-                files.append(str(trajectory.animate(animate)))
+                files.append(trajectory.animate(animate))
         values = _run_to_dict(equations, trajectory, energy) | {"seconds": seconds}
         uncounted = power.uncounted if energy and energy.work is None else ()
         tables = tables_of(trajectory, energy, uncounted)
     source.show(values, str(equations.report), *operations_of(equations), *tables, files=files)
-
-
-def _check_files(out: Path | None, plot: Path | None, picture: Picture) -> None:
-    """Fail before the work if what comes of it cannot be written."""
-    if out is not None:
-        from ..runtime.storage import RUNS  # which takes as long to import as all verbs
-
-        if out.suffix not in RUNS:
-            raise bad_file(f"--out {out}: a run is written as {' or '.join(RUNS)}")
-    check_picture(plot, picture)
-    require_folder("--out", out)
-    require_folder("--plot", plot)
-
-
-def _write(
-    equations: Equations, trajectory: Trajectory, out: Path | None, plot: Path | None, picture: Picture
-) -> list[str]:
-    if out is not None:
-        trajectory.save(out)
-    if plot is not None:
-        plot_run(trajectory, find_paths(equations.kinematics.mechanism), trajectory.name, plot, picture)
-    return [str(file) for file in (out, plot) if file is not None]
 
 
 def _final_names(trajectory: Trajectory) -> list[str]:
@@ -199,7 +175,7 @@ SHOWN = 9  #: of them on the screen
 @verb(POSITIONS)
 def kinematics(
     source: Source,
-    picture: Picture,
+    output: Output,
     ranges: Annotated[
         Texts,
         "NAME=START:END[:COUNT]: Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges must "
@@ -207,25 +183,23 @@ def kinematics(
     ] = (),
     limits: Annotated[Texts, "NAME: Find how far a coordinate can move from the start."] = (),
     partial: Annotated[bool, "If the range cannot be reached completely, return the part that can."] = False,
-    out: Annotated[Path | None, "FILE: Write all columns to FILE.npz, .csv, .nc or .parquet."] = None,
-    plot: Annotated[Path | None, "FILE: Draw them, e.g. to FILE.png."] = None,
 ) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
 
     Without --range, drivers move the model from t = 0 to the end given in its file.
     """
     requested = parse_spans("--range", ranges, "NAME=START:END[:COUNT]", "theta=0:2*pi:361")
-    _check_files(out, plot, picture)
+    output.check()
     work = source.compile("embedding")
     equations, module = work.equations, work.bound().module
-    check_columns(module, picture)
+    output.check_columns(module)
     named = _range_values(module, requested) if requested or not limits else {}
     start = perf_counter()
     with stage("kinematics"):
         motion = module.kinematic_analysis(initial=work.initial, partial=partial, **named) if named else None
         result = [module.motion_range(name, initial=work.initial) for name in limits]
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
-    files = [] if motion is None else _write(equations, motion, out, plot, picture)
+    files = [] if motion is None else output.write(equations.kinematics.mechanism, motion)
     values = {"name": module.name, "report": summary(equations)["report"], "seconds": seconds}
     values |= {"motion": None if motion is None else _motion_to_dict(motion), "limits": [r.to_dict() for r in result]}
     tables = [
