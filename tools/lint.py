@@ -125,8 +125,6 @@ def directions() -> Iterator[str]:
     graph = {name: imports_of(name) for name in FILES}
     calls = import_module("eomgen.module").CALLS  # named as text
     graph["eomgen.module"] |= {f"eomgen.{home}" for home in calls.values()}
-    groups = import_module("eomgen.verify.verify").GROUPS
-    graph["eomgen.verify.verify"] |= {"eomgen.verify.check_" for group in groups}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:

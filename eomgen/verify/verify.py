@@ -6,7 +6,6 @@ bodies, constraints, derivatives and runs; then what concerns the model as it wa
 
 from __future__ import annotations
 
-from importlib import import_module
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -29,14 +28,6 @@ if TYPE_CHECKING:
 
 STATES = 6  #: random states
 SECONDS, LEAST = 12.0, 2.0  #: for all of it, and for variants of a model at least
-#: Files of checks that need the equations, in the order of the table; each has ``check(model)``.
-GROUPS = (  #: group of checks -> the file with its function
-    dict.fromkeys(("kernels",), "check_kernels")
-    | dict.fromkeys(("bodies", "joints", "reactions", "reaction_laws"), "check_bodies")
-    | dict.fromkeys(("constraints", "derivatives"), "check_kernels")
-    | {"runs": "check_runs"}
-)
-KINEMATIC = ("kernels", "constraints")  #: of models without inertia
 
 
 def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
@@ -132,6 +123,9 @@ def _with_equations(
     if why:
         return [Finding.skipped("graph, free bodies, derivatives, runs, variants", why)]
     from ..mechanics.methods.positive import FREE, note_lost_digits, smallest_share
+    from . import check_bodies as b
+    from . import check_kernels as k
+    from .check_runs import check_runs
     from .checked import CheckedModel
 
     model, result = CheckedModel(module, equations, random), []
@@ -143,12 +137,13 @@ def _with_equations(
     elif equations.method not in FREE and (note := note_lost_digits(*parts)):
         share = smallest_share(*parts)
         result.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
-    for group in KINEMATIC if massless else GROUPS:
-        check = getattr(import_module(f"{__package__}.{GROUPS[group]}"), f"check_{group}")
+    groups = [k.check_kernels, b.check_bodies, b.check_joints, b.check_reactions, b.check_reaction_laws]
+    groups += [k.check_constraints, k.check_derivatives, check_runs]
+    for check in [k.check_kernels, k.check_constraints] if massless else groups:
         try:
             result += check(model)
         except (EomgenError, ArithmeticError) as error:
-            result.append(failed(f"checks of {group}", error))
+            result.append(failed(f"checks of {check.__name__.removeprefix('check_')}", error))
     if not massless:
         from .variants import variant_findings
 
