@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import ElementType, Law
 from ..elements.joints import JOINTS
-from ..elements.kinds import Field, Rates, Text, items
+from ..elements.kinds import Field, Rates, Scalar, Text, items
 from ..errors import UsageError, ill_typed, no_such
 from .description import DescribedEntry
 from .fields import MODEL
@@ -76,7 +76,8 @@ def _arguments(element: ElementType, key: str, field: Field, later: bool) -> lis
         return [Argument("*between", key, kind, "Any", None, "Where it acts: one joint or coordinate, or two markers.")]
     if field.required and field.joins:
         return [Argument(name, key, "handle or str", "Any", Parameter.empty, doc) for name in element.ends]
-    return [Argument("value" if key == element.name else key, key, kind, annotation, default, doc)]
+    name = "value" if key == element.name and isinstance(field, Scalar) else key
+    return [Argument(name, key, kind, annotation, default, doc)]
 
 
 def signature_of(element: ElementType) -> Signature:
@@ -172,7 +173,7 @@ def method_of(section: str, element: ElementType) -> Callable[..., Any]:
             bound.apply_defaults()
         raw = {key: value for key, value in bound.arguments.items() if value is not None or key in element.ends}
         name, raw = bound.arguments["name"], {key: x for key, x in raw.items() if key not in ("self", "name")}
-        if element.name in element.keys:
+        if isinstance(element.keys.get(element.name), Scalar):
             raw = {element.name if key == "value" else key: x for key, x in raw.items()}
         single = raw.pop("keys", {}) if laws else {}
         law, types = raw.get("law", {}), laws[0].types if laws and laws[0].required else None

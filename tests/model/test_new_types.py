@@ -220,3 +220,10 @@ def test_a_constraint_holds_what_it_says() -> None:
     x = mod.x0()
     np.testing.assert_allclose(x[2], 0.25, atol=1e-12)
     assert mod.rhs(0.0, x)[5] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_keys_called_as_their_type_are_arguments_of_that_name() -> None:
+    m = eg.Model("two")
+    assert "rack : handle" in m.rack.__doc__
+    assert "cam : handle" in m.cam.__doc__
+    assert "value : scalar" in m.sampled.__doc__
