@@ -93,7 +93,7 @@ class OnGpu:
 def device(report: Report, quick: bool) -> None:
     """Compare and time where there is a GPU; else only say so."""
     from eomgen.errors import EomgenError
-    from eomgen.runtime.device.cuda_device import CudaDevice
+    from eomgen.runtime.device import CudaDevice
 
     try:
         gpu = CudaDevice()

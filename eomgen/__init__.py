@@ -67,7 +67,7 @@ def _lazy(name: str) -> Any:
         near = (
             ""
             if name.startswith("_")
-            else import_module(".base.names", __name__).hint(name, [n for n in __all__ if n not in _TYPES])
+            else import_module(".base.texts", __name__).hint(name, [n for n in __all__ if n not in _TYPES])
         )
         text = f"module {__name__!r} has no attribute {name!r}; {near}".removesuffix("; ")
         raise import_module(".errors", __name__).UnavailableError(text)

@@ -29,7 +29,7 @@ from .handles import BodyHandle, ConstraintHandle, Described, ForceHandle, Joint
 
 Value = Any  # a number, a text or a SymPy expression
 
-def methods() -> dict[str, list[ElementType]]: ...
+def methods() -> dict[str, Mapping[str, ElementType]]: ...
 
 class ElementMethods(Described):
     def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
@@ -71,7 +71,7 @@ def module_stub() -> str:
 def element_stub() -> str:
     """The text of element_methods.pyi."""
     text = _HEAD.format(_summary(ElementMethods.joint.__doc__ or ""))
-    return text + "".join(_method(section, found) for section, types in methods().items() for found in types)
+    return text + "".join(_method(section, found) for section, types in methods().items() for found in types.values())
 
 
 def _method(section: str, found: ElementType) -> str:

@@ -26,7 +26,6 @@ from ..errors import (
     off_range,
 )
 from ..runtime.argument_checks import check_names, read_flag, read_number, without_dots
-from ..runtime.columns import Columns, Residuals, describe
 from ..runtime.constrained import ProjectedStates
 from ..runtime.impacts.impact import SI, Gaps, Impact, Rough, allowance, apply, find_sliding, one_state
 from ..runtime.inputs import Forcing
@@ -37,7 +36,7 @@ from ..runtime.runs.integrate import header_of
 from ..runtime.runs.run_arguments import find_state, set_up
 from ..runtime.runs.simulate import simulate
 from ..runtime.storage import Stored
-from ..runtime.trajectory import Span, Start, Trajectory
+from ..runtime.trajectory import Columns, Residuals, Span, Start, Trajectory, describe
 from .drive import coordinate_slopes
 
 if TYPE_CHECKING:

@@ -27,15 +27,14 @@ from ..base.limits.constraints import CONTRADICTION, PASSED, STATE
 from ..base.limits.impacts import OPENS
 from ..base.limits.positions import SINGULAR
 from ..base.limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
-from ..base.names import place_of_marker
 from ..base.results import Result, ResultTable, plain, same_keys
+from ..base.texts import place_of_marker
 from ..errors import NoDerivativeError, SimulationError, at_odds, ill_placed, ill_typed, incomplete, untrue
 from ..runtime.argument_checks import check_names, plain_name, read_names, read_number, require_steps, unknown
 from ..runtime.change_points import scaled_jacobians, singular_values
-from ..runtime.columns import Named
-from ..runtime.failure import place
 from ..runtime.initial import Initial
 from ..runtime.inputs import Forcing, Table
+from ..runtime.kernels import place
 from ..runtime.layout import Layout, start_slopes
 from ..runtime.protocols import BoundValues
 from ..runtime.refusals import require_support
@@ -45,7 +44,7 @@ from ..runtime.runs.integrate import Solution, choose_solver, integrate, record,
 from ..runtime.runs.run_arguments import check_tolerances, find_state, longest_step, ordered_times, set_up
 from ..runtime.runs.simulate import simulate
 from ..runtime.storage import table_path
-from ..runtime.trajectory import Span, Start
+from ..runtime.trajectory import Named, Span, Start
 from .limits import QUADRATURE
 from .saltation import Differentiated, EventSlopes, Saltation, SlopesNow, Variational, assembly_rows
 

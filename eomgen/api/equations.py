@@ -14,8 +14,7 @@ from ..runtime.argument_checks import find_lacking
 
 if TYPE_CHECKING:
     from ..explain import Explanation
-    from ..runtime.device.cuda_device import Device
-    from ..runtime.device.device_module import DeviceModule
+    from ..runtime.device import Device, DeviceModule
     from ..toolchain.compiler import BuildOptions
 
 
@@ -145,13 +144,13 @@ class Equations(Derivation):
         Parameters
         ----------
         device : Device, optional
-            ``eomgen.runtime.device.cuda_device.CudaDevice(1)`` for the second GPU; the first by default.
+            ``eomgen.runtime.device.CudaDevice(1)`` for the second GPU; the first by default.
 
         Returns
         -------
         DeviceModule
             ``rhs(t, x, p=None, u=None)`` and others for states (n_x, k), ``simulate_many(span, x0)``; see
-            :class:`~eomgen.runtime.device.device_module.DeviceModule`.
+            :class:`~eomgen.runtime.device.DeviceModule`.
 
         Raises
         ------

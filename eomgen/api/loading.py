@@ -7,8 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Unpack
 
 from ..base.files import as_name, example_files, find_example
-from ..base.names import hint
-from ..base.texts import shown
+from ..base.texts import hint, shown
 from ..base.value_rules import CHECKS, word_of_check
 from ..errors import ModelError, at_odds, bad_file, no_choice, no_such
 from ..model import describe_yaml_file

@@ -11,8 +11,7 @@ from importlib import import_module
 
 import click
 
-from ..base.names import hint
-from ..base.texts import visible
+from ..base.texts import hint, visible
 from ..errors import UsageError
 from .output import USAGE, name_options, print_json, to_dict
 

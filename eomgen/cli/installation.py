@@ -21,9 +21,8 @@ import click
 
 from ..base.files import example_files, find_example, shipped, write_whole
 from ..base.limits.constraints import UNMOVED
-from ..base.names import hint
 from ..base.results import ResultTable
-from ..base.texts import parse_python, visible
+from ..base.texts import hint, parse_python, visible
 from ..errors import EomgenError, at_odds, bad_file, no_such
 from ..expr.without_gc import timed
 from .options import NumberRange, verb

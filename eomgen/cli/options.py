@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 import click
 
 from ..base.files import example_files, kind_of, refuse_link
-from ..base.names import closest, place_of_marker
 from ..base.results import Result, ResultTable
+from ..base.texts import closest, place_of_marker
 from ..errors import ModelError, UsageError, at_odds, bad_file, ill_chosen, ill_typed, no_number, off_range
 from ..runtime.argument_checks import check_names
 from ..toolchain.targets import TARGETS

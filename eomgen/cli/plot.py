@@ -82,7 +82,7 @@ class Output:
     def check_columns(self, module: Module) -> None:
         """Fail before a run if it will have no column of a name."""
         from ..runtime.argument_checks import check_names
-        from ..runtime.columns import column_names
+        from ..runtime.trajectory import column_names
 
         known = ("t", *column_names(module.layout))
         check_names("column", map(module.layout.plain, filter(None, (*self.columns, self.against))), known)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..base.kernel_table import KERNELS, NAMED, Kernel
-from ..base.names import hint, joined
 from ..base.operations import operations_with
+from ..base.texts import hint, joined
 from ..errors import UsageError, ill_placed, no_such
 from ..expr.core import LEAVES, Expr, Graph, reachable, symbols_of
 from ..expr.functions import Curve, Function, NativeCode, Surface
@@ -26,10 +26,9 @@ from ..mechanics.methods.positive import require_inertia
 from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..runtime.layout import ABI, ModelInfo
-from .contact_columns import COLUMNS
 from .kernels import BlockMaker
 from .metadata import collect_metadata
-from .program import SHIFTS, Block, KernelDriver, Limits, Program, hoist
+from .program import COLUMNS, SHIFTS, Block, KernelDriver, Limits, Program, hoist
 from .terms import SystemTerms
 
 #: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.

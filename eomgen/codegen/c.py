@@ -14,7 +14,6 @@ from ..toolchain.layer import PAIRS_HEADER, SOLVER, SOLVER_HEADERS, read_header,
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files, lane_kernels, series_files
 from .c_layout import describe_equations, is_straight, work_areas
-from .c_pairs import pair_declarations, pair_files
 from .c_rolled import print_block_of_branches, print_rolled
 from .c_text import Printed, print_block, used_helpers, with_pieces
 from .files import SourceSet, describe_layouts, metadata_json, render
@@ -22,7 +21,6 @@ from .loop_systems import LARGE
 from .pair_sums import contact_tables, used_sums
 from .program import BY_MOTIONS, BY_SYSTEM, Block, Program
 from .series import NoSeriesError
-from .standalone_c import in_single_precision, operations_of, refuse_double, stack_of, states_beside_change_points
 
 #: Headers of the numbers that functions compute with, and of what stands around functions.
 HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_calls.h")
@@ -54,6 +52,8 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
     """
     single = precision == "float"
     if single:
+        from .standalone_c import refuse_double
+
         refuse_double(program)
     lanes = lanes and not single
     in_lanes = lane_kernels(program) if lanes else []
@@ -84,12 +84,17 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
         **(lane_files(program, context, for_lanes) if lanes else {}),
         **series,
         **function_files(program, calls),
-        **pair_files(program),
     }
+    if used_sums(program):
+        from .c_pairs import pair_files
+
+        sources |= pair_files(program)
     if program.drivers:
         sources |= {name: read_header(name) for name in SOLVER_HEADERS} | {SOLVER: read_layer()[SOLVER]}
     sources |= {name: read_header(name) for name in (*HEADERS, *([PAIRS_HEADER] if used_sums(program) else []))}
     if precision:
+        from .standalone_c import in_single_precision, states_beside_change_points
+
         context |= {"costs": _costs(program, sources), "most_states": states_beside_change_points()}
     sources |= {f"{name}.h": render("c/model.h.j2", context), "model.json": metadata_json(program)}
     return SourceSet(in_single_precision(sources) if single else sources)
@@ -151,6 +156,8 @@ def _linked(program: Program, apart: Collection[str]) -> list[str]:
 
 def _costs(program: Program, sources: Mapping[str, str]) -> dict[str, tuple[str, int]]:
     """Operations and bytes of stack of every public function, by name."""
+    from .standalone_c import operations_of, stack_of
+
     metadata = f"{program.name}_metadata.c"
     texts = [text for name, text in sources.items() if name.endswith((".c", ".h")) and name != metadata]
     stacks = stack_of(texts, program.name, {"N": str(program.sizes.n_v)})
@@ -190,6 +197,15 @@ def _printed_for_lanes(program: Program, printed: Mapping[str, Printed]) -> dict
     }
 
 
+def _pair_declarations(program: Program) -> list[str]:
+    """Declarations of sums over pairs of shapes, by what no other program loads."""
+    if not used_sums(program):
+        return []
+    from .c_pairs import pair_declarations
+
+    return pair_declarations(program)
+
+
 def _context(program: Program, printed: Mapping[str, Printed], work: int, apart: Collection[str]) -> dict[str, Any]:
     aliases, in_lanes = program.aliases, program.metadata["lanes"]
     areas, n_work = work_areas(program, work)
@@ -209,7 +225,7 @@ def _context(program: Program, printed: Mapping[str, Printed], work: int, apart:
         "hoisted": len(program.hoisted),
         "work_at": len(program.parameters) + len(program.hoisted),
         "helpers": used_helpers(program, roots),
-        "declarations": [*declarations(program, used_calls(program)), *pair_declarations(program)],
+        "declarations": [*declarations(program, used_calls(program)), *_pair_declarations(program)],
         "arguments": _describe_arguments(program),
         "equations": describe_equations(program, areas, _linked(program, apart), stepping) if program.drivers else None,
         "straight": straight,

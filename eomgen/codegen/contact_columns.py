@@ -11,16 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..contact.pair_sums import POSE
+from ..contact.pair_sums import POSE, WRENCH
 from ..contact.pairs import PairFunction, pair_call
 from ..expr.core import Expr, Graph, reachable, substitute, symbols_of
 from ..expr.differentiate import jvp
 from .terms import SystemTerms
 
-#: Blocks of M of the bodies and h, of the operands of the sums, and of the residual along wrenches on their bodies.
-COLUMNS = ("contact_terms", "contact_operands", "contact_loads")
 LEAST = 48  #: states of contacts from which the driver is worth its text
-WRENCH = 6  #: numbers of what a body gets
 LOADED = -1  #: in a set of velocities: what a body gets
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from ..base.kernel_table import DAE, NAMED
 from ..contact.pairs import pairs_of_bodies, without_pairs
@@ -15,13 +16,28 @@ from ..expr.core import Expr, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian, jvp
 from ..expr.schedule import count
 from ..mechanics.wrenches import inertial_terms
-from .contact_columns import COLUMNS, ContactColumns, contact_columns
 from .jacobian_blocks import Entries, LoopSlopes, ResidualSlopes, solve_tree, unrolled_jacobian, unrolled_shift
 from .linear_algebra import articulated_positivity, is_unrolled
 from .loop_motions import MotionLoops, motion_loops
 from .loop_systems import BodyLoops, LoopBlocks, straight_loops
-from .program import ALONG, BY_BODIES, BY_MOTIONS, BY_SYSTEM, COMPOSED, RATES, SHIFTS, Block, Limits, Port, flat
+from .program import (
+    ALONG,
+    BY_BODIES,
+    BY_MOTIONS,
+    BY_SYSTEM,
+    COLUMNS,
+    COMPOSED,
+    RATES,
+    SHIFTS,
+    Block,
+    Limits,
+    Port,
+    flat,
+)
 from .terms import SystemTerms
+
+if TYPE_CHECKING:
+    from .contact_columns import ContactColumns
 
 
 # -- expressions of kernels ---------------------------------------------------------------------------------------
@@ -197,7 +213,11 @@ class BlockMaker:
     def contacts(self) -> ContactColumns | None:
         """The columns of states of contacts, where the Jacobian of a tree is made direction by direction."""
         plain = self.limits.unrolled_loops > 0 and not self.has_loops  # drivers over arrays take all terms
-        return contact_columns(self.terms) if plain and self.by_direction else None
+        if not (plain and self.by_direction):
+            return None
+        from .contact_columns import contact_columns
+
+        return contact_columns(self.terms)
 
     @cached_property
     def slopes(self) -> ResidualSlopes:

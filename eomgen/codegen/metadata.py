@@ -9,10 +9,10 @@ from math import isfinite
 from typing import Any
 
 from ..base.limits.constraints import HELD_STEP
-from ..base.names import acceleration_name
 from ..base.operations import OPERATIONS
+from ..base.texts import acceleration_name
 from ..base.value_rules import RANGE
-from ..elements.constraints import RollingDisc
+from ..elements.constraints.rolling import RollingDisc
 from ..elements.frames import GROUND, Marker
 from ..elements.joints import Cylindrical, Free, Planar, Prismatic, Translational
 from ..errors import TO_BE_FINITE, ModelError, UsageError

@@ -17,8 +17,8 @@ from ..base.files import open_plain, refuse_link
 from ..base.texts import one_line, shortened
 from ..errors import UsageError, bad_file, cannot, no_choice
 from ..expr.notation import Notation
-from ..runtime.columns import column_names
 from ..runtime.layout import Layout, ModelInfo
+from ..runtime.trajectory import column_names
 from ..toolchain.layer import read_native
 from ..toolchain.targets import PRECISIONS, find_target
 from .c import emit_c
@@ -50,7 +50,7 @@ CONTENTS = ("errors.py", "module.py", "base", "runtime", "analysis")
 #: Of these the folders that not every package has, whole or not at all -> when: by its model, its target, --analyses.
 OPTIONAL: dict[str, Callable[[ModelInfo, str, bool], bool]] = {
     "analysis/": lambda info, target, analyses: analyses,
-    "runtime/device/": lambda info, target, analyses: target == "cuda",
+    "runtime/device.py": lambda info, target, analyses: target == "cuda",
     "runtime/impacts/": lambda info, target, analyses: (
         analyses or bool(info.rigid_contacts) or any(event.get("restitution") is not None for event in info.events)
     ),

@@ -7,11 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
-from ..contact.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT
+from ..contact.pair_sums import MEETING, MOTION, PLACE, POSE, REST, RESULT, WRENCH
 from ..contact.pairs import PairCall, PairFunction, pair_call
 from ..errors import cannot
 from ..expr.core import Expr, Graph, reachable
-from .contact_columns import WRENCH
 from .program import BY_BODIES, Program
 
 

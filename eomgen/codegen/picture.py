@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..elements.forces import Force
+from ..elements.forces.force import Force
 from ..elements.frames import Frame, Marker, WrapCylinder
 from ..elements.looks import (
     ARROW,

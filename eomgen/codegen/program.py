@@ -10,14 +10,16 @@ from dataclasses import field
 from functools import cached_property
 from itertools import chain
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.kernel_table import Sizes
 from ..expr.core import LEAVES, Expr, Graph, reachable
 from ..expr.records import Record
 from ..expr.schedule import Operations
 from ..mechanics.methods.tree_equations import LinearSystem
-from .contact_columns import ContactColumns
+
+if TYPE_CHECKING:
+    from .contact_columns import ContactColumns
 
 COMPOSED = ("mass_times", "bias", "constraint_jacobian", "gamma")  #: what M, h, C_q and gamma are put together from
 RATES = ("rates", "moved", "rates_along")  #: blocks of given q' = N v + b
@@ -33,6 +35,9 @@ SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
 
 #: Kernels whose columns are derivatives along directions where they are not written out -> the block of one.
 ALONG = {"dae_jacobian": "dae_tangent", "inverse_dynamics_derivatives": "inverse_tangent"}
+
+#: Of states of contacts: M of the bodies and h, operands of the sums, the residual along wrenches on their bodies.
+COLUMNS = ("contact_terms", "contact_operands", "contact_loads")
 
 #: Blocks that only trees have whose accelerations are known without their mass matrix.
 BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")

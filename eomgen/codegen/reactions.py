@@ -14,8 +14,8 @@ from ..base.algebra import correlated
 from ..base.limits.constraints import STRUCTURE
 from ..base.limits.numbers import SINGULAR
 from ..base.operations import CONDITION, OPERATIONS
-from ..elements.forces import CoordinateLoad, JointCoordinate, MarkerLoad, ReactionFriction
-from ..elements.forces.friction import is_reaction, multiplier_of, reaction_of
+from ..elements.forces.force import CoordinateLoad, MarkerLoad, is_reaction, multiplier_of, reaction_of
+from ..elements.forces.paths import JointCoordinate
 from ..errors import ModelError, Problem
 from ..expr.core import Expr, common_graph, operands, reachable, substitute, symbols_of
 from ..expr.differentiate import jacobian
@@ -45,14 +45,11 @@ def solve_multipliers(rows: Sequence[Sequence[Expr]], forces: Sequence[Expr]) ->
     return factorize_tree(gram, range(-1, len(rows) - 1)).solve([-dot(row, forces) for row in rows])
 
 
-def multiplier_values(kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
+def multiplier_values(given: Sequence[str], kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
     """What the named multipliers of a model stand for."""
-    written = kinematics.mechanism.given
-    if written is None or not written.multipliers:
-        return {}
     graph = kinematics.graph
     values = solve_multipliers(kinematics.constraints.jacobian, equations.inverse_dynamics)
-    names = {f"constraint_{k + 1}": name for k, name in enumerate(written.multipliers)}
+    names = {f"constraint_{k + 1}": name for k, name in enumerate(given)}
     return {
         graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
     }
@@ -176,6 +173,8 @@ def too_many_pieces(mechanism: Mechanism, force: str) -> Problem:
 
 def refuse_joints(kinematics: Kinematics) -> None:
     """Refuse friction in joints whose reaction has no force across, or along, the z axis of S."""
+    from ..elements.forces.friction import ReactionFriction
+
     graph, mechanism = kinematics.graph, kinematics.mechanism
     specs, problems = {spec.name: spec for spec in mechanism.joints}, []
     for force in mechanism.forces:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import cached_property, partial
 
 from ..base.kernel_table import Sizes
-from ..base.names import acceleration_name
 from ..base.operations import operations_with
+from ..base.texts import acceleration_name
 from ..contact.pairs import pair_call
 from ..elements.forces.force import where
 from ..errors import UsageError
@@ -25,7 +25,6 @@ from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.wrenches import find_wrenches, mass_parents, motion_axes, near_pairs
 from .linear_algebra import has_long_paths
-from .reactions import multiplier_values
 
 Row = tuple[Expr, ...]
 LARGEST = 1e300  #: size of a load that still counts as a number
@@ -350,7 +349,12 @@ def resolved(unresolved: Sequence[Expr], kinematics: Kinematics, equations: Tree
         graph.symbol("potential_energy()"): equations.potential_energy,
         graph.symbol("total_energy()"): equations.kinetic_energy + equations.potential_energy,
     }
-    return tuple(substitute(expressions, energies | multiplier_values(kinematics, equations)))
+    given = kinematics.mechanism.given
+    if given is not None and given.multipliers:
+        from .reactions import multiplier_values
+
+        energies |= multiplier_values(given.multipliers, kinematics, equations)
+    return tuple(substitute(expressions, energies))
 
 
 def _meeting_times(kinematics: Kinematics) -> list[Expr]:

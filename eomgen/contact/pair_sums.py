@@ -59,6 +59,7 @@ def across(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 POSE = 18
 #: Numbers that a pair gives: force on the second shape, torques on both about their centres, the first first, energy.
 RESULT = 10
+WRENCH = 6  #: numbers of what a body gets
 #: Columns of a row of a table of shapes before the sizes: the body, and where its position and rotation stand.
 PLACE = 13
 #: Columns behind the sizes: where the radius of the sphere that bounds the shape and its thickness stand.

@@ -14,7 +14,6 @@ from ..expr.core import Expr, Graph, Node, reachable, substitute
 from ..expr.evaluate import Evaluator
 from ..expr.functions import Function
 from ..expr.records import Record
-from .pair_features import facing, nearest
 from .pair_sums import MEETING, MOTION, POSE, PairSum, pairs_of_rows
 
 # -- pair kinds --------------------------------------------------------------------------------------------------------
@@ -236,9 +235,13 @@ class PairFunction:
     def _law(kind: PairKind, part: PairPart, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> Any:
         sloped = part == "slopes"
         law = made(kind.expressions(part), kind.symbols if sloped else kind.plain)
+        if not kind.corners:
+            return law
+        from .pair_features import facing, nearest
+
         if len(kind.corners) == 1:
             return nearest(law, *kind.corners, sloped)
-        return facing(law, (kind.corners[0], kind.corners[1]), sloped) if kind.corners else law
+        return facing(law, (kind.corners[0], kind.corners[1]), sloped)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}  # loops are made anew

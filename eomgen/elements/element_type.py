@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import re
 from abc import ABC
-from collections.abc import Callable, Mapping, Sequence
+from collections import UserDict
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ..base.value_rules import Allowed
@@ -255,10 +257,24 @@ class ElementType(NamedTuple):
         return {"type": Choice(f"type of the {what}", required=True, choices=tuple(types)), **self.keys}
 
 
-Types = dict[str, ElementType]
+Types = MutableMapping[str, ElementType]
 
 
-def table(*types: ElementType) -> Types:
+class TypeTable(UserDict[str, ElementType]):
+    """Types by their names, of files of one package: each file has them as TYPES, and is loaded when one is used."""
+
+    def __init__(self, package: str, **files: str) -> None:
+        """``files`` has the names of the types of each file, in order."""
+        super().__init__()
+        self.data: dict[str, Any] = {name: f"{package}.{file}" for file, x in files.items() for name in x.split()}
+
+    def __getitem__(self, name: str) -> ElementType:
+        if isinstance(self.data[name], str):
+            self.data[name] = import_module(self.data[name]).TYPES[name]
+        return self.data[name]  # type: ignore[no-any-return]
+
+
+def table(*types: ElementType) -> dict[str, ElementType]:
     """Types by their names."""
     return {one.name: one for one in types}
 

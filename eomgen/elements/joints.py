@@ -15,9 +15,9 @@ from ..expr.core import Expr, Graph, atan2, cos, sin, sqrt, substitute, symbols_
 from ..expr.differentiate import jvp
 from ..expr.vectors import Mat3, Vec3
 from . import kinds
-from .constraints.switching import SWITCHING
+from .constraints.constraint import SWITCHING
 from .dimensions import ENERGY, LENGTH, REACH, TIME
-from .element_type import Element, ElementType, Types, key, keys_of, table
+from .element_type import Element, ElementType, key, keys_of, table
 from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
 from .looks import JointLook, SymbolPart
 from .rotations import euler_parameters_from_matrix
@@ -836,7 +836,7 @@ def joint(kind: type[Joint]) -> ElementType:
     return ElementType(kind.type_name, doc, kind.keys(), ends=("predecessor", "successor"), kind=kind)
 
 
-JOINTS: Types = table(
+JOINTS = table(
     *map(
         joint,
         (

@@ -16,7 +16,7 @@ from copy import copy
 from numbers import Real
 from typing import Any, ClassVar
 
-from ..base.names import LONGEST
+from ..base.texts import LONGEST
 from ..base.value_rules import CHECKS, NOT_NEGATIVE, POSITIVE, Allowed
 from .dimensions import LENGTH, NONE, TIME, Dimension
 from .frames import Marker, WrapCylinder

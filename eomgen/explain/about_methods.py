@@ -12,9 +12,8 @@ from ..errors import UnavailableError
 from ..expr.core import Expr
 from ..expr.differentiate import gradient
 from ..expr.notation import dotted
-from ..reading import Quantities
 from ..reading.document import Piece, Section, Sentence
-from ..reading.quantities import needed
+from ..reading.quantities import Quantities, needed
 from .author import Author, PrintedQuantity
 
 

@@ -14,10 +14,10 @@ from ..expr.notation import Notation, literal
 from ..expr.printing.formula import ROUNDED, Formula, Formulas, Letter, number
 from ..mechanics.report import plane_axis
 from ..model.components import with_instance
-from ..reading import Quantities, ReadingView
+from ..reading import ReadingView
 from ..reading.document import Folded, FormulaLine, Piece, Sentence
 from ..reading.printed import order_of
-from ..reading.quantities import Written, needed
+from ..reading.quantities import Quantities, Written, needed
 
 WHOLE = 160  #: nodes of a matrix up to which it is shown as a matrix, not entry by entry
 FOLD = 900  #: nodes of a quantity from which a page shows it only on request

@@ -12,7 +12,7 @@ import numpy as np
 import sympy
 
 from ..base.limits.numbers import ALIKE, EPS, ROUNDED
-from ..base.names import acceleration_name
+from ..base.texts import acceleration_name
 from ..errors import EomgenError
 from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate as of_graph

@@ -8,14 +8,13 @@ from typing import Any
 
 import sympy
 
-from ..base.names import acceleration_name
 from ..base.results import trimmed_png
-from ..elements.constraints.switching import event_of
-from ..elements.frames import GROUND
+from ..base.texts import acceleration_name
+from ..elements.constraints.constraint import event_of
+from ..elements.frames import GROUND, axis_word
 from ..errors import EomgenError, UnavailableError
 from ..expr.core import Expr
 from ..model.mechanism import JointSpec, Switched
-from ..model.placement import axis_word
 from ..reading.document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
 from .author import Author, nodes
 from .comparison import Difference, is_rounding, known_values, value_of

@@ -12,8 +12,7 @@ from collections.abc import Iterable
 from functools import cache
 from typing import NamedTuple
 
-from ..base.names import hint
-from ..base.texts import html_text, visible
+from ..base.texts import hint, html_text, visible
 
 # -- letters and signs of LaTeX and their characters, accents, styles --------------------------------------------------
 

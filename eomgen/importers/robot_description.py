@@ -11,12 +11,12 @@ import numpy as np
 
 from ..base.limits.numbers import SINGULAR
 from ..base.value_rules import EXCESS, fault_of_inertia, inertia_scales, longest_within
+from ..elements.frames import TURNS, axis_word
 from ..elements.joints import JOINTS
 from ..elements.rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from ..errors import ModelError, Problem
 from ..model.description import GROUND_NAME, Description, Values
 from ..model.names import LONGEST, RATES, clean_name, fault_of_model_name, listing, nearest, unique
-from ..model.placement import TURNS, axis_word
 from .limits import FREEDOMS, LARGEST, LAWS, TIES
 from .robot import (
     IDENTITY,

@@ -1,19 +1,5 @@
 """Mechanism -> Kinematics (spanning tree, poses, twists, loop constraints) and its mobility."""
 
-from .kinematics import ForceTerms, Kinematics, LoopCoordinates, analyse
-from .loops import Constraints
-from .topology import Branch, Topology, find_topology
-from .tree import Link, Poses
+from .kinematics import Kinematics, analyse
 
-__all__ = [
-    "Branch",
-    "Constraints",
-    "ForceTerms",
-    "Kinematics",
-    "Link",
-    "LoopCoordinates",
-    "Poses",
-    "Topology",
-    "analyse",
-    "find_topology",
-]
+__all__ = ["Kinematics", "analyse"]

@@ -6,7 +6,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, fields, is_dataclass
 from functools import cached_property
 
-from ..elements.forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
+from ..elements.forces.force import CoordinateLoad, Force, Load, MarkerLoad
+from ..elements.forces.paths import JointCoordinate, Turn
 from ..elements.frames import Marker
 from ..errors import ModelError
 from ..expr import vectors as vec

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.limits.numbers import ROUNDED
-from ..elements.constraints import Equation, RollingDisc
-from ..elements.constraints.constraint import ALLOWED, VELOCITY, Condition
-from ..elements.forces import Line, Route
+from ..elements.constraints.constraint import ALLOWED, VELOCITY, Condition, Equation
+from ..elements.constraints.rolling import RollingDisc
+from ..elements.forces.paths import Line, Route
 from ..elements.frames import Frame, Marker, WrapCylinder
 from ..elements.joints import Closure
 from ..errors import ModelError, Problem

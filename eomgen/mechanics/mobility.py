@@ -11,9 +11,9 @@ from ..base.algebra import rank
 from ..base.assembly import Assembly, ConstraintSystem, differences
 from ..base.continuation import Continuation, HeldPath
 from ..base.limits.constraints import BESIDE, CHOSEN, CONTRADICTION, FLAT
-from ..base.names import hint, joined
-from ..elements.constraints import Driver, RollingDisc
-from ..elements.constraints.rolling import LYING
+from ..base.texts import hint, joined
+from ..elements.constraints.drivers import Driver
+from ..elements.constraints.rolling import LYING, RollingDisc
 from ..errors import TO_BE_FINITE, AssemblyError, ModelError, Problem
 from ..expr.core import Expr, substitute, symbols_of
 from ..expr.evaluate import Evaluator

@@ -6,9 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Protocol, TypeVar, cast
 
-from ..elements.forces import CoordinateLoad
-from ..elements.forces.force import Force, MarkerLoad, View, beyond_zero
-from ..elements.forces.friction import reaction_symbol
+from ..elements.forces.force import CoordinateLoad, Force, MarkerLoad, View, beyond_zero, reaction_symbol
 from ..elements.frames import GROUND, Frame, Marker
 from ..errors import ModelError
 from ..expr import vectors as vec

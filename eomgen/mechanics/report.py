@@ -19,7 +19,7 @@ from ..base.operations import CHOICE, OPERATIONS
 from ..base.results import picture_html, side_by_side
 from ..base.scales import largest
 from ..base.texts import angle_in_degrees, fold, html_table, terminal_width
-from ..elements.constraints import Driver
+from ..elements.constraints.drivers import Driver
 from ..elements.frames import Marker
 from ..errors import bad_file
 from ..expr import vectors as vec

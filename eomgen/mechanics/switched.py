@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from ..elements.forces import CoordinateLoad, MarkerLoad
-from ..elements.forces.force import Force, Load, View, where
+from ..elements.forces.force import CoordinateLoad, Force, Load, MarkerLoad, View, where
 from ..expr import vectors as vec
 from ..expr.core import Expr, reachable
 from ..expr.differentiate import jacobian

@@ -16,8 +16,8 @@ from itertools import combinations
 import numpy as np
 
 from ..base.limits.numbers import HAIR, NO_LENGTH
-from ..base.names import acceleration_name
-from ..elements.constraints import CoordinateDriver
+from ..base.texts import acceleration_name
+from ..elements.constraints.drivers import CoordinateDriver
 from ..elements.frames import GROUND
 from ..elements.joints import Distance, QuaternionSlot, RevoluteSpherical, parameter_rates
 from ..errors import ModelError

@@ -12,8 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from ..elements.forces import CoordinateLoad, MarkerLoad
-from ..elements.forces.force import Force
+from ..elements.forces.force import CoordinateLoad, Force, MarkerLoad
 from ..elements.frames import GROUND, Frame, Marker
 from ..expr import vectors as vec
 from ..expr.core import Expr, substitute, symbols_of

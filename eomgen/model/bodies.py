@@ -17,7 +17,7 @@ from ..base.files import beside
 from ..base.limits.numbers import COMPUTED, TENSOR, TENSOR_TERMS
 from ..base.value_rules import BODIES, EXCESS, NOT_NEGATIVE, SWITCH, inertia_scales, judge_bodies, longest_within
 from ..elements import kinds
-from ..elements.frames import GROUND, Frame
+from ..elements.frames import GROUND, TURNS, Frame, rpy_rotation, turn_matrix
 from ..elements.kinds import DISPLAY, MARKER, POINT, Vector
 from ..elements.solids import SOLIDS, MassProperties, combine, measure_mesh, point
 from ..errors import UsageError
@@ -31,7 +31,6 @@ from .description import DescribedEntry, items, place_of
 from .fields import BODY, SOLID, SOLID_KEYS, solid_fields
 from .mechanism import Body, BodyShape, JointSpec
 from .names import nearest
-from .placement import TURNS, rpy_rotation, turn_matrix
 from .requirements import Requirements
 from .values import Reader
 

@@ -7,11 +7,10 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ..base.value_rules import TURN
-from ..elements.constraints import Constraint
-from ..elements.constraints.cams import Profile
-from ..elements.constraints.switching import SWITCHING
+from ..elements.constraints.constraint import SWITCHING, Constraint
 from ..elements.element_type import ElementType, Entry, Types
 from ..elements.forces import FORCES
+from ..elements.frames import TURNS, turn_matrix
 from ..elements.joints import DATA, JOINTS, Joint
 from ..elements.kinds import Scalar
 from ..errors import ModelError
@@ -20,7 +19,6 @@ from ..expr.records import Record
 from .checks import check_keys, check_names
 from .description import DescribedEntry, Description, items
 from .mechanism import STATE_RATE, FirstOrderState, JointSpec
-from .placement import TURNS, turn_matrix
 from .requirements import Requirements
 from .sympy_face import name_of
 from .values import Reader, take_coordinates_latex, take_latex
@@ -183,8 +181,7 @@ def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -
     for constraint in constraints:
         for own in fields(constraint):
             profile = getattr(constraint, own.name)
-            turn = profile.over_a_turn() if isinstance(profile, Profile) else None
-            if turn is None:
+            if (turn := profile.over_a_turn() if hasattr(profile, "over_a_turn") else None) is None:
                 continue
             laws, angle = turn
             where = " at the declared values" if symbols_of(laws) - {angle} else ""

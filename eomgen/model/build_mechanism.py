@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from ..base.names import place_of_marker
+from ..base.texts import place_of_marker
 from ..elements import kinds
 from ..elements.constraints import CONSTRAINTS
-from ..elements.forces import FORCES, Force
+from ..elements.forces import FORCES
+from ..elements.forces.force import Force
 from ..elements.frames import GROUND, Frame, Marker
 from ..errors import ModelError
 from ..expr import vectors as vec
@@ -58,10 +59,16 @@ from .fields import GROUND as GROUND_FIELDS
 from .mechanism import Body, Mechanism, Presentation, RunDefaults, Simulation
 from .names import Namespace, fault_of_model_name
 from .quantities import SUMS, ReactionQuantity, WrenchQuantity
-from .read_shapes import read_shapes
 from .sympy_face import in_order, name_of
 from .values import Reader
 from .visit import undotted
+
+
+def _shapes(reader: Reader, path: str, value: Any) -> Any:
+    """The shapes of a group, read by what no other model loads."""
+    from .read_shapes import read_shapes
+
+    return read_shapes(reader, path, value)
 
 
 def build(description: Description) -> Mechanism:
@@ -104,7 +111,7 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     reader.mass_data = bodies = _bodies(reader, sections["bodies"])
     reader.specs = joints = build_joints(reader, reader.joints)
-    reader.shapes = partial(read_shapes, reader)
+    reader.shapes = partial(_shapes, reader)
     forces = build_elements(reader, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     raw = build_equations(reader, given_values)

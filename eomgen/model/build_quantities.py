@@ -11,8 +11,7 @@ from typing import Any
 from ..base.operations import OPERATIONS
 from ..base.value_rules import POSITIVE
 from ..elements import kinds
-from ..elements.constraints import Constraint
-from ..elements.constraints.switching import SWITCHING, event_of, is_switched, state_of
+from ..elements.constraints.constraint import SWITCHING, Constraint, event_of, is_switched, state_of
 from ..elements.dimensions import NONE
 from ..elements.element_type import Entry
 from ..elements.kinds import LAW, MOTION, OUTPUT, Fields

@@ -14,8 +14,8 @@ from dataclasses import replace
 from functools import partialmethod
 from typing import Any, NamedTuple
 
-from ..base.names import place_of_marker
 from ..base.operations import OPERATIONS
+from ..base.texts import place_of_marker
 from ..elements.dimensions import ENERGY, FORCE, INERTIA, LENGTH, MASS, NONE, SPEED, SPIN, STIFFNESS, TIME, Dimension
 from ..elements.element_type import Law
 from ..elements.kinds import OUTPUT, Field

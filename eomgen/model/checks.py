@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
-from ..base.names import closest
-from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..base.texts import closest
+from ..elements.constraints.constraint import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import Law
 from ..elements.frames import GROUND
 from ..elements.kinds import Fields

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MethodType
 from typing import Any
 
@@ -50,7 +51,7 @@ ENTRIES = {
         'equations.  Solids are mappings ``{"type": "box", "size": (a, b, c), "density": rho, "at": (x, y, z), "rpy": '
         f'(r, p, y)}}`` of the types {", ".join(SOLID)}; ``"subtract": True`` makes a hole.  Points are ``{{"mass": m, '
         '"at": (x, y, z)}``.  Markers are positions, ``{"tip": (l, 0, 0)}``, or mappings of what '
-        ":meth:`.BodyHandle.marker` takes.",
+        ":meth:`~.handles.BodyHandle.marker` takes.",
         BODY,
     ),
 }
@@ -97,12 +98,12 @@ NATIVE = ElementType(
 )
 
 
-def methods() -> dict[str, list[ElementType]]:
-    """Section -> what its methods add."""
-    single = {section: [one] for section, one in ENTRIES.items()}
-    single["states"].append(SAMPLED)
-    single["functions"].append(NATIVE)
-    return single | {section: [*types.values()] for section, types in ELEMENTS.items()}
+def methods() -> dict[str, Mapping[str, ElementType]]:
+    """Section -> what its methods add, by name."""
+    single: dict[str, Mapping[str, ElementType]] = {section: {one.name: one} for section, one in ENTRIES.items()}
+    for section, one in (("states", SAMPLED), ("functions", NATIVE)):
+        single[section] = {**single[section], one.name: one}
+    return single | ELEMENTS
 
 
 class ElementMethods(Described):
@@ -144,15 +145,15 @@ class ElementMethods(Described):
 class _Unmade:
     """In the place of a type's method until it is first used: to make all of them takes 15 ms."""
 
-    def __init__(self, section: str, type: ElementType) -> None:
-        self.section, self.type = section, type
+    def __init__(self, section: str, types: Mapping[str, ElementType], name: str) -> None:
+        self.section, self.types, self.name = section, types, name
 
     def __get__(self, model: Described | None, kind: Any) -> Any:
-        method = method_of(self.section, self.type)
-        setattr(ElementMethods, self.type.name, method)
+        method = method_of(self.section, self.types[self.name])
+        setattr(ElementMethods, self.name, method)
         return method if model is None else MethodType(method, model)
 
 
 for _section, _types in methods().items():
-    for _found in _types:
-        setattr(ElementMethods, _found.name, _Unmade(_section, _found))
+    for _name in _types:
+        setattr(ElementMethods, _name, _Unmade(_section, _types, _name))

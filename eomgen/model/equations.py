@@ -10,8 +10,8 @@ from typing import Any
 from ..base.limits.numbers import TENSOR
 from ..base.operations import CONDITION, operations_with
 from ..elements import kinds
-from ..elements.constraints import Driver, Equation
-from ..elements.constraints.constraint import NO_EQUATION, POSITION, Constraint
+from ..elements.constraints.constraint import NO_EQUATION, POSITION, Constraint, Equation
+from ..elements.constraints.drivers import Driver
 from ..elements.kinds import MOTION, Fields
 from ..expr.core import Expr, Graph, is_comparison, reachable, substitute, symbols_of
 from ..expr.differentiate import gradient, hessian, jacobian, jvp

@@ -30,7 +30,7 @@ TABLES = {
 }
 
 # Contact stands before muscles, creep and tyres in lists of types.
-FORCES |= CONTACTS | {name: FORCES.pop(name) for name in ("muscle", "creep", "tyre")}
+FORCES.data |= CONTACTS.data | {name: FORCES.data.pop(name) for name in ("muscle", "creep", "tyre")}
 
 #: Section of elements -> its types.
 ELEMENTS: dict[str, Types] = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}

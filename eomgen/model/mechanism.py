@@ -17,14 +17,13 @@ import numpy as np
 
 from ..base.limits.runs import ATOL, RTOL
 from ..base.operations import OPERATIONS
-from ..elements.frames import Frame, Marker
+from ..elements.frames import TURNS, Columns, Frame, Marker
 from ..elements.kinds import Field
 from ..errors import ModelError, Problem
 from ..expr.core import LEAVES, Expr, Graph, reachable
 from ..expr.records import Record
 from ..expr.vectors import Mat3, Vec3
 from .description import as_written, place_of
-from .placement import TURNS, Columns
 from .quantities import Quantity, ReactionQuantity, WrenchQuantity
 from .requirements import Requirement
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import Parameter, Signature
 from typing import Any, NamedTuple
 
-from ..elements.constraints.switching import IN_PLACE_OF_JOINTS, SWITCHING
+from ..elements.constraints.constraint import IN_PLACE_OF_JOINTS, SWITCHING
 from ..elements.element_type import ElementType, Law
 from ..elements.joints import JOINTS
 from ..elements.kinds import Field, Rates, Scalar, Text, items

@@ -9,10 +9,9 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
 from ..base.files import write_whole
-from ..base.names import hint
+from ..base.texts import hint
 from ..errors import UnavailableError, UsageError, at_odds, ill_typed
 from .build_mechanism import build
-from .components import Component, Instance, add_instance, attempt, component_of, named_attachments
 from .description import GROUND_NAME, SECTIONS, Description, Faults, model_html
 from .element_methods import ElementMethods
 from .equations import describe
@@ -295,6 +294,9 @@ class Builder(ElementMethods):
         ModelError
             The file of the component has faults.
         """
+
+        from .components import Instance, add_instance, attempt, named_attachments
+
         part = _component(component)
         if prefix and fault_of_name(prefix):
             raise UsageError(
@@ -466,8 +468,10 @@ class Builder(ElementMethods):
 _SINGULAR = {section: {"bodies": "body"}.get(section, section[:-1]) for section in SECTIONS}
 
 
-def _component(raw: Any) -> Component:
+def _component(raw: Any) -> Any:
     """A component of a Model, or of the file of one."""
+    from .components import component_of
+
     faults = Faults(Description())
     if isinstance(raw, str | os.PathLike):
         description = describe_yaml_file(raw)

@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
-from ..base.names import LONGEST as LONGEST
-from ..base.names import hint, joined
 from ..base.operations import OPERATIONS
+from ..base.texts import LONGEST as LONGEST
+from ..base.texts import hint, joined
 from ..elements.frames import Marker
 from ..elements.kinds import CONSTANT, LAW, MOTION, NUMBER, OUTPUT
 from ..errors import ExpressionError

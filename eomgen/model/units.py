@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..base.names import closest
+from ..base.texts import closest
 from ..elements import dimensions
 from ..elements.dimensions import Dimension
 from ..expr.texts import quoted

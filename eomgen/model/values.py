@@ -15,11 +15,22 @@ from typing import Any
 
 from ..base.files import usable_name
 from ..base.limits.numbers import PERPENDICULAR
-from ..base.names import hint
+from ..base.texts import hint
 from ..base.value_rules import ROTATION, word_of_check
 from ..elements import kinds
 from ..elements.element_type import Entry, Found, Meaning
-from ..elements.frames import GROUND, Frame, Marker
+from ..elements.frames import (
+    GROUND,
+    TURNS,
+    Columns,
+    Frame,
+    Marker,
+    axes_columns,
+    axis_columns,
+    complete_axes,
+    rpy_rotation,
+    turn_matrix,
+)
 from ..elements.joints import JOINTS
 from ..elements.kinds import CONSTANT, LAW, MARKER, NUMBER, PLACED
 from ..errors import ExpressionError
@@ -33,7 +44,6 @@ from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
 from .mechanism import Body, BodyShape, JointSpec
 from .names import ENERGIES, RATES, WHOLE, Namespace, Scope, join_surrogates, lone_surrogate, nearest
-from .placement import TURNS, Columns, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .quantities import Named, Quantity
 from .requirements import Requirements
 from .sympy_face import is_sympy, lower_sympy, name_of, named

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..base.names import place_of_marker
-from ..base.names import undotted as undotted_name
+from ..base.texts import place_of_marker
+from ..base.texts import undotted as undotted_name
 from ..elements.kinds import Field, Fields
 from .description import DescribedEntry, Description
 from .fields import EQUATIONS, LAGRANGIAN, fields_of

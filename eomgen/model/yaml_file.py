@@ -19,7 +19,6 @@ from ..elements import kinds
 from ..elements.kinds import Field, items
 from ..errors import ModelError, Problem, UsageError, cannot
 from ..expr.texts import comment_text, shortened, yaml_quoted
-from .components import Components
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults
 from .fields import MODEL, PARTS, SHORT, fields_of
 from .names import WHOLE, join_surrogates, lone_surrogate, nearest
@@ -257,6 +256,8 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
             description.values[key] = value
     fill(tree, "", description)
     if tree.get("components") is not None or tree.get("add") is not None:
+        from .components import Components
+
         components = Components(tree.get("components"), document.lines, fill, open_file, faults)
         components.add(tree.get("add"), "", description)
         components.read_all()

@@ -4,7 +4,6 @@ Reading happens in copies of the graph: nothing that is read changes what is com
 """
 
 from .displayed import Displayed, ReadingView
-from .quantities import Quantities
 from .readable import Readable
 
-__all__ = ["Displayed", "Quantities", "Readable", "ReadingView"]
+__all__ = ["Displayed", "Readable", "ReadingView"]

@@ -125,7 +125,6 @@ def derive_mechanism(
 ) -> Derived:
     """The equations of motion of what a model says; ``described`` is the time (s) that reading it took."""
     from ..codegen.choice import choose
-    from ..codegen.reactions import with_reactions
 
     seconds = {"describe": described}
     chosen = choose_method(mechanism, method)
@@ -138,6 +137,8 @@ def derive_mechanism(
         kinematics = _stabilised(kinematics, chosen, baumgarte)
     with without_gc(), timed(seconds, "equations"):
         if mechanism.reaction_quantities or mechanism.switched or any(force.by_reaction for force in mechanism.forces):
+            from ..codegen.reactions import with_reactions
+
             kinematics = with_reactions(kinematics, mobility)
         choice: Choice | None = None
         if chosen == GIVEN:

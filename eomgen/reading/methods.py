@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..base.names import acceleration_name
+from ..base.texts import acceleration_name
 from ..elements.frames import GROUND
 from ..errors import ExpressionError, UnavailableError, UsageError, at_odds, ill_typed
 from ..expr import vectors as vec

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import sympy
 
-from ..base.names import acceleration_name
+from ..base.texts import acceleration_name
 from ..elements.frames import GROUND
 from ..expr.core import Expr, symbols_of
 from ..expr.notation import Notation, dotted, raised

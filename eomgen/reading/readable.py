@@ -5,10 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
+from importlib import import_module
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from ..base.names import acceleration_name, hint
+from ..base.texts import acceleration_name, hint
 from ..errors import NonFiniteError, at_odds, incomplete
 from ..expr.core import Expr, Graph, copied, symbols_of
 from ..expr.evaluate import evaluate
@@ -18,27 +19,18 @@ from ..mechanics.methods import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..model.visit import Undotted
 from ..runtime.argument_checks import UnknownNameError
-from .methods import (
-    BlockSystem,
-    BodiesApart,
-    block_system,
-    body_mass_matrix,
-    body_velocities,
-    gibbs_function,
-    hamiltonian,
-    model_notation,
-    momentum_names,
-    momentum_rates,
-    put_in,
-    read_value,
-    read_values,
-)
-from .near_state import SymbolicLinearization, here, linearize, over_one_denominator
-from .quantities import Quantities, SpatialMotion, Written, is_short, needed, require_bodies, with_derivatives
-from .tree_system import MANY, TreeParts, TreeSystem, is_long, tree_parts
 
 if TYPE_CHECKING:
+    from .methods import BlockSystem
     from .named_parts import ByName, NamedSum
+    from .near_state import SymbolicLinearization
+    from .quantities import Quantities, SpatialMotion, Written
+    from .tree_system import TreeParts, TreeSystem
+
+    Choose = Callable[[Quantities], Sequence[Expr]]
+    ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
+
+# What forms quantities is loaded when one is read: compiling needs none.
 
 # -- functions of time -------------------------------------------------------------------------------------------------
 
@@ -49,6 +41,8 @@ def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
     Velocities that are no rates of coordinates (``ball_wx``), inputs, momenta and multipliers are functions of time as
     well; parameters are plain symbols; t is ``dynamicsymbols._t``.
     """
+    from .methods import momentum_names
+
     orders: dict[str, tuple[str, int]] = {name: (name, 0) for name in kinematics.names}
     loop = kinematics.loop_coordinates.names
     for name in (*kinematics.names, *loop):
@@ -83,8 +77,6 @@ def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
 Made = TypeVar("Made")  #: what a quantity is
 Derived = tuple[Kinematics, Mobility, TreeEquations]
 Names = list[tuple[str, Expr]]
-Choose = Callable[[Quantities], Sequence[Expr]]
-ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
 #: What equations must have for a display to name a quantity among those to read next.
 ANY, BODIES, PARTS, LOOPS = "any", "bodies", "parts", "loops"
 SHOWN = 8  #: names that a message lists
@@ -139,6 +131,11 @@ def matrix(
 def quantity(offered: str = "", by_name: bool = False) -> Callable[[Callable[[Any], Made]], Quantity[Made]]:
     """A row that a method makes."""
     return lambda make: Quantity(lambda eqs, _: make(eqs), make.__doc__, offered, by_name)
+
+
+def _of_method(name: str) -> Callable[[Quantities], Any]:
+    """The function of this name that forms a quantity which single methods have."""
+    return lambda quantities: getattr(import_module(".methods", __package__), name)(quantities)
 
 
 def _n(equations: Readable) -> int:
@@ -223,6 +220,8 @@ class Readable(ABC):
     @cached_property
     def notation(self) -> Notation:
         """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
+        from .methods import model_notation
+
         return model_notation(self.kinematics, self.names_substituted)
 
     # -- symbols ------------------------------------------------------------------------------------------------------
@@ -257,6 +256,8 @@ class Readable(ABC):
     @property
     def momentum_symbols(self) -> tuple[Any, ...]:
         """The symbols of the momenta in ``hamiltonian``, one for each of ``v``."""
+        from .methods import momentum_names
+
         return self._symbols(momentum_names(self.kinematics))
 
     # -- energies -----------------------------------------------------------------------------------------------------
@@ -326,6 +327,8 @@ class Readable(ABC):
     # -- motion of bodies and markers ---------------------------------------------------------------------------------
     def _places(self) -> tuple[str, ...]:
         """Names of bodies and of named markers."""
+        from .quantities import require_bodies
+
         require_bodies(self.kinematics)
         mechanism = self.kinematics.mechanism
         return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.presentation.named_markers))
@@ -340,17 +343,19 @@ class Readable(ABC):
     @quantity(BODIES, by_name=True)
     def velocities(self) -> ByName[SpatialMotion]:
         """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
-        make = partial(self._spatial, "velocities", Quantities.velocity)
+        make = partial(self._spatial, "velocities", lambda s, one: s.velocity(one))
         return self._by_name("body or marker", self._places(), make)
 
     @quantity(BODIES, by_name=True)
     def accelerations(self) -> ByName[SpatialMotion]:
         """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
-        make = partial(self._spatial, "accelerations", Quantities.acceleration)
+        make = partial(self._spatial, "accelerations", lambda s, one: s.acceleration(one))
         return self._by_name("body or marker", self._places(), make)
 
     def _spatial(self, what: str, of: Callable[[Quantities, str], SpatialMotion], name: str) -> SpatialMotion:
         import sympy
+
+        from .quantities import SpatialMotion
 
         written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
         return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
@@ -392,6 +397,9 @@ class Readable(ABC):
         """Whether loops make ``mass_matrix`` and ``force`` so long that ``tree_system`` is read more easily."""
         if self.mobility.n_dof in (0, len(self.kinematics.v)):
             return False
+        from .quantities import Quantities
+        from .tree_system import MANY, is_long
+
         return is_long(Quantities(*self.fresh())) or len(self.intermediates) > MANY
 
     @quantity()
@@ -403,6 +411,8 @@ class Readable(ABC):
         parts.
         """
         import sympy
+
+        from .tree_system import TreeSystem, tree_parts
 
         n_v, n_c = len(self.kinematics.v), len(self.constraint_names)
         formed: list[TreeParts] = []
@@ -424,26 +434,26 @@ class Readable(ABC):
         Of each body the velocity of its centre of mass in ground axes, then its angular velocity in body axes.
         ``B_b.T * body_mass_matrix * B_b`` is ``mass_matrix``, less the inertia of drives.
         """,
-        form=body_velocities,
+        form=_of_method("body_velocities"),
     )
     body_mass_matrix = matrix(
         lambda eqs: 6 * len(eqs.kinematics.mechanism.bodies),
         "M_b (6 n_b, 6 n_b): mass and inertia of each body, for the velocities of ``body_velocity_transformation``.",
-        form=body_mass_matrix,
+        form=_of_method("body_mass_matrix"),
     )
     gibbs_function = scalar(
         "S (W^2 kg) of method ``gibbs_appell``: dS/dv' = M v' - Q_v on the tree; without terms free of v'.",
-        form=gibbs_function,
+        form=_of_method("gibbs_function"),
         prefix="S_",
     )
     hamiltonian = scalar(
         "H(q, p, t) (J) of method ``hamilton``, in the momenta ``p_theta``, ... of ``momentum_symbols``.",
-        form=hamiltonian,
+        form=_of_method("hamiltonian"),
         prefix="H_",
     )
     momentum_rates = column(
         "p' = -dH/dq + Q (n_v, 1) of method ``hamilton``, in q and v, without the forces of constraints.",
-        form=momentum_rates,
+        form=_of_method("momentum_rates"),
     )
 
     @quantity()
@@ -455,6 +465,8 @@ class Readable(ABC):
         wrench of its joint (``A_M_x``, ``A_F_x``), then multipliers.
         """
         import sympy
+
+        from .methods import BlockSystem, block_system
 
         names: list[str] = []
 
@@ -474,6 +486,9 @@ class Readable(ABC):
         Reactions of the joints of the tree are ``A_F_x``, ..., ``A_M_x``, ... on the body that the joint carries, at
         the joint, in ground axes; those of joints that close loops are written with their multipliers ``lambda_1``, ...
         """
+        from .methods import BodiesApart
+        from .quantities import Quantities
+
         BodiesApart(Quantities(*self.fresh()))  # refuses other methods now
 
         def make(name: str) -> FreeBody:
@@ -490,6 +505,9 @@ class Readable(ABC):
         The left side is the component of the reaction in ``free_bodies``; the right side what force elements and
         constraint elements exert along the coordinate, 0 if there are none.
         """
+
+        from .methods import BodiesApart
+        from .quantities import Quantities
 
         def make(name: str) -> list[Any]:
             pairs = self._write(
@@ -541,6 +559,8 @@ class Readable(ABC):
         [-g/l, 0]])
         """
         import sympy
+
+        from .near_state import SymbolicLinearization, here, linearize, over_one_denominator
 
         values = self._read(at or {})
         states: list[tuple[str, ...]] = []
@@ -638,6 +658,7 @@ class Readable(ABC):
         written several times get names in any case.
         """
         from ..expr.simplify import WHOLE, joined_nodes, simplify
+        from .quantities import Written, is_short, with_derivatives
 
         k = self.kinematics
         rates = frozenset((*k.velocity_names, *map(acceleration_name, k.velocity_names)))
@@ -651,6 +672,9 @@ class Readable(ABC):
 
     def _form(self, choose: Choose, choose_names: ChooseNames | None) -> tuple[list[Expr], Names]:
         """Expressions of the quantities with values put in, and what names in them stand for."""
+        from .methods import put_in
+        from .quantities import Quantities
+
         quantities = Quantities(*self.fresh())
         expressions = list(choose(quantities))
         names = list(choose_names(quantities)) if choose_names is not None else []
@@ -675,6 +699,8 @@ class Readable(ABC):
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
+        from .methods import put_in
+
         result = copied(list(expressions)) if self._put_in else list(expressions)
         for values in self._put_in:
             result = put_in(result, values)
@@ -713,6 +739,8 @@ class Readable(ABC):
 
     def _read(self, named: Any, what: str = "symbol") -> dict[str, Any]:
         """Values that a user puts in for names."""
+        from .methods import read_values
+
         allowed = self.kinematics.parameter_names if what == "parameter" else self._known
         return read_values(named, allowed, what, self._plain)
 
@@ -749,6 +777,7 @@ class Readable(ABC):
         ([], m*s_dot**2/2)
         """
         from .named_parts import NamedSum
+        from .quantities import needed
 
         table = {row.name: row for row in self.rows()}
         if name not in table:
@@ -778,11 +807,15 @@ class Readable(ABC):
     @property
     def _known(self) -> tuple[str, ...]:
         """Names for which values can be put in."""
+        from .methods import momentum_names
+
         return (*self._own, *momentum_names(self.kinematics), *self.names_substituted)
 
     @property
     def names_substituted(self) -> tuple[str, ...]:
         """Names that the model does not have and that values put in have brought."""
+        from .methods import read_value
+
         graph = Graph()
         values = (read_value(graph, name, value) for named in self._put_in for name, value in named.items())
         return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
@@ -794,6 +827,8 @@ class Readable(ABC):
     def _as_given(self, value: Any) -> Any:
         if isinstance(value, float | int):
             return value
+        from .methods import read_value
+
         return self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
 
     def symbols_substituted(self, names: Sequence[str]) -> list[Any]:

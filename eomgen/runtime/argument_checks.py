@@ -16,8 +16,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.kernel_table import argument
 from ..base.limits.runs import MOST_NUMBERS, MOST_STEPS
-from ..base.names import undotted
-from ..base.texts import shown
+from ..base.texts import shown, undotted
 from ..base.value_rules import as_count, read_count
 from ..errors import (
     MissingDependencyError,
@@ -288,7 +287,7 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
 
 def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     choice = list(dict.fromkeys(allowed))
-    if near := import_module("..base.names", __package__).closest(name, choice, 3):
+    if near := import_module("..base.texts", __package__).closest(name, choice, 3):
         return f"did you mean {' or '.join(near)}?"
     if not choice:
         return "there are none"

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..base.algebra import Array
 from ..base.kernel_table import NAMED, Sizes
-from ..base.names import acceleration_name
 from ..base.operations import play_arrays
 from ..base.scales import Scales, Space
+from ..base.texts import acceleration_name
 from ..base.value_rules import POINTS, RULES, Allowed, Flaw, judge_range, surely_right
 from ..errors import ParameterError, Problem, bad_data, calls_within, cannot, ill_shaped
 from .argument_checks import check_names, plain_name, read_number, read_numbers, without_dots

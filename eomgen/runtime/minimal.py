@@ -32,8 +32,7 @@ from ..errors import (
     too_large,
 )
 from .argument_checks import both_names, read_number, read_numbers, read_state
-from .failure import place
-from .kernels import Kernels
+from .kernels import Kernels, place
 from .layout import Layout
 from .refusals import require_support, require_switched
 

@@ -18,7 +18,6 @@ from .argument_checks import check_names, plain_name, read_names, require, unkno
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
-    from .columns import Columns
 
 # -- states between steps ----------------------------------------------------------------------------------------------
 
@@ -67,12 +66,10 @@ def states_at(trajectory: Any, module: BoundModel, times: Array) -> tuple[Array,
     return states, u
 
 
-def _columns_at(trajectory: Any, module: BoundModel, times: Array) -> Columns:
+def _columns_at(trajectory: Any, module: BoundModel, times: Array) -> Any:
     """All columns of a run at times within it."""
-    from .columns import Columns
-
     states, u = states_at(trajectory, module, times)
-    return Columns(module, times, states, np.empty((0, len(times))) if u is None else u)
+    return type(trajectory.columns)(module, times, states, np.empty((0, len(times))) if u is None else u)
 
 
 def monotone_slopes(t: Array, y: Array) -> Array:
@@ -90,7 +87,7 @@ def monotone_slopes(t: Array, y: Array) -> Array:
     return slopes
 
 
-def refined_energies(trajectory: Any, times: Array, columns: Columns) -> Array:
+def refined_energies(trajectory: Any, times: Array, columns: Any) -> Array:
     """Kinetic, potential and total energy (3, k) at times between the steps of a run.
 
     States between the steps have the error of their cubics, which is far above what the integrator lets the energy
@@ -120,12 +117,17 @@ def _between_steps(
     trajectory: Any, names: tuple[str, ...], energies: bool
 ) -> tuple[Array, dict[str, Array], Array | None]:
     from ..errors import EvaluationError
-    from .columns import Columns
 
     t = trajectory.t
     parts = -(-FINE // max(1, len(t) - 1))
     module = getattr(trajectory.columns, "module", None)
-    if module is not None and type(trajectory.columns) is Columns and parts > 1 and len(t) > 1 and t[0] != t[-1]:
+    if (
+        module is not None
+        and type(trajectory.columns).__name__ == "Columns"
+        and parts > 1
+        and len(t) > 1
+        and t[0] != t[-1]
+    ):
         steps = np.arange(parts) / parts
         times = np.append((t[:-1, None] + np.diff(t)[:, None] * steps).ravel(), t[-1])
         times = times[np.append(True, np.diff(times) != 0.0)]

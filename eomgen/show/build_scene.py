@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.names import hint
 from ..base.picture_data import GROUND, PictureData, PlacedFrame, read_picture
+from ..base.texts import hint
 from ..errors import no_such, not_finite
 from .limits import ROUNDED, SAME
 from .scene import Item, Label, Scene, attachments, distinct, find_view, frame_items, link_items, placed, symbol_size

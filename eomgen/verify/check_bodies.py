@@ -11,8 +11,8 @@ from ..analysis.reactions import reactions
 from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.numbers import EPS, TINY
-from ..elements.forces import ReactionFriction
-from ..elements.forces.friction import reaction_symbol
+from ..elements.forces.force import reaction_symbol
+from ..elements.forces.friction import ReactionFriction
 from ..elements.frames import GROUND, Marker
 from ..elements.joints import Continuous, Prismatic, Revolute
 from ..expr.core import Expr, substitute, symbols_of

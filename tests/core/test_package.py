@@ -111,6 +111,14 @@ def test_a_warm_run_loads_nothing_heavy() -> None:
     assert not names & {"scipy", "sympy", "rich", "Cython", "pandas", "matplotlib", "mujoco", "trimesh"}
 
 
+def test_a_new_model_loads_what_it_uses(tmp_path: Path) -> None:
+    script = f"import sys, eomgen; eomgen.load({str(MODEL)!r}).compile().simulate(0.1); print(*sys.modules)"
+    loaded = run("-c", script, cwd=tmp_path, XDG_CACHE_HOME=str(tmp_path))
+    names = [name for name in loaded.split() if name.partition(".")[0] == "eomgen"]
+    assert len(names) <= 160
+    assert not [name for name in names if "soil" in name or "muscle" in name or "components" in name]
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the sdist of a copy of this checkout, and the wheel built from that sdist."""

@@ -12,10 +12,12 @@ import pytest
 
 import eomgen as eg
 from eomgen.base.value_rules import POSITIVE
-from eomgen.elements.constraints import CONSTRAINTS, Condition, Constraint, ConstraintView
+from eomgen.elements.constraints import CONSTRAINTS
+from eomgen.elements.constraints.constraint import Condition, Constraint, ConstraintView
 from eomgen.elements.dimensions import LENGTH, NONE, STIFFNESS
 from eomgen.elements.element_type import element, key
-from eomgen.elements.forces import FORCES, View
+from eomgen.elements.forces import FORCES
+from eomgen.elements.forces.force import View
 from eomgen.elements.forces.paths import LINE, PathForce
 from eomgen.elements.frames import Marker
 from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint, joint

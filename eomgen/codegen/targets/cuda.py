@@ -13,8 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ...errors import cannot
-from ...runtime.device.cuda_device import CUDA_REQUIREMENTS
-from ...runtime.device.device_module import TIMED_ON_DEVICE, DeviceModule
+from ...runtime.device import CUDA_REQUIREMENTS, TIMED_ON_DEVICE, DeviceModule
 from ...runtime.runs.events import GO_ON, RESET, crowd_of
 from ...toolchain.layer import read_layer, read_sources
 from ...toolchain.targets import DEVICE_KERNELS
@@ -28,7 +27,7 @@ from ..program import Block, KernelDriver, Program
 from ..statements import cut
 
 if TYPE_CHECKING:
-    from ...runtime.device.cuda_device import Device
+    from ...runtime.device import Device
 
 #: Methods of ensembles: rows of n numbers that each needs in K and F.
 METHODS = {"dop853": 15 + 7, "rk4": 4 + 3}

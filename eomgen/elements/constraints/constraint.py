@@ -7,13 +7,15 @@ Coordinates are held as symbols under their own names; the kinematics stage repl
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, NamedTuple, Protocol
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ...expr.core import Expr, is_comparison, symbols_of
 from ...expr.differentiate import gradient
-from ..element_type import Element, ElementType, Entry, Meaning, table
+from ..dimensions import SPIN
+from ..element_type import Element, ElementType, Entry, Meaning
 from ..frames import Frame, Marker, MotionView
-from ..kinds import OUTPUT, Factors, Scalar
+from ..kinds import LAW, OUTPUT, Factors, Fields, Flag, Scalar, SomeNames
 from ..looks import Seen
 
 POSITION, VELOCITY = "position", "velocity"
@@ -81,6 +83,49 @@ def on_two_bodies(e: Entry, key: str, a: Marker | None, b: Marker | None) -> boo
         remedy = "choose a marker on another body for one of them"
         e.fault(key, f"{a.label} and {b.label} are on the same body", remedy, "EG-REFERENCE")
     return a.body != b.body
+
+
+# -- keys of constraints that close and open --------------------------------------------------------------------------
+
+
+#: Of any constraint that may close and open in a run.
+SWITCHING: Fields = {
+    "closes": Scalar("where it falls to 0 the constraint closes: a plastic impact, after which it holds", level=LAW),
+    "opens": Scalar("where it falls to 0 while the constraint holds, it lets go", level=LAW),
+    "closed": Flag("whether it holds at the start of a run; false if closes is given, else true"),
+    "releases": SomeNames("one or several other constraints that let go as it closes, before the impact"),
+    "stabilisation": Scalar(
+        "rate (1/s), greater than 0, at which an error of the equation dies away while it holds",
+        default=10,
+        dimension=SPIN,
+    ),
+}
+
+#: How a condition of a joint without coordinates is written that holds for a time.
+IN_PLACE_OF_JOINTS = (
+    "joints without coordinates, except welds, cannot open; use a constraint of type hold: axes: xyz, turning: xyz "
+    "acts as a weld, axes: xyz without turning as a ball joint, axes: xy, turning: z in the plane"
+)
+
+
+def switchable(*types: ElementType) -> dict[str, ElementType]:
+    """The table of types with these keys too."""
+    return {one.name: one._replace(keys=one.keys | SWITCHING) for one in types}
+
+
+def is_switched(values: Mapping[str, Any]) -> bool:
+    """Whether an entry says that a constraint or joint closes or opens."""
+    return not values.keys().isdisjoint(("closes", "opens", "closed"))
+
+
+def state_of(name: str) -> str:
+    """The first-order state that is 1 while the constraint or joint of a name holds."""
+    return f"{name}_closed"
+
+
+def event_of(name: str, key: str) -> str:
+    """The event at which it ``closes`` or ``opens``."""
+    return f"{name}_{key}"
 
 
 # -- relations between coordinates that the user writes out ------------------------------------------------------------
@@ -168,7 +213,7 @@ def _equation(e: Entry) -> Equation | None:
     return Equation(e.name, expression, kind, VELOCITY if rates else POSITION)
 
 
-TYPES = table(
+TYPES = switchable(
     ElementType(
         "coupling",
         "a relation between coordinates: a linear one, or any equation.",

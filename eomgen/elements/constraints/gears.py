@@ -9,10 +9,10 @@ from ...base.value_rules import POSITIVE
 from ...base.value_rules import WHEELS as WHEELS_FIT
 from ...expr.core import Expr, sin
 from ..dimensions import LENGTH, NONE
-from ..element_type import ElementType, Entry, Found, Where, element, key, table
+from ..element_type import ElementType, Entry, Found, Where, element, key
 from ..kinds import Fields, Flag, JointPair, JointReference, Scalar, Two, Wheels
 from ..looks import PitchCircles, RackAndPinion, Seen
-from .constraint import Condition, Constraint, ConstraintView
+from .constraint import Condition, Constraint, ConstraintView, switchable
 
 
 class Pair(Constraint):
@@ -117,7 +117,7 @@ _CONES = Two(
 _INTERNAL = Flag("whether one gear is internal, so that both turn the same way", default=False)
 _CROSSED = Flag("whether the belt crosses, so that the pulleys turn in opposite directions", default=False)
 
-TYPES = table(
+TYPES = switchable(
     element(
         Gear,
         "gear",
@@ -241,7 +241,7 @@ def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
 
 _FIXED = "joint that turns the {0} relative to the frame; fixed if left out"
 
-TYPES |= table(
+TYPES |= switchable(
     ElementType(
         "planetary",
         "a planetary gear set: its meshing wheels follow Willis' equation.",

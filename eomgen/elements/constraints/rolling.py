@@ -12,11 +12,11 @@ from ...expr.core import Expr, cos, sin, sqrt, substitute
 from ...expr.differentiate import jvp
 from ...expr.vectors import Vec3
 from ..dimensions import LENGTH, NONE
-from ..element_type import ElementType, Entry, element, key, table
+from ..element_type import ElementType, Entry, element, key
 from ..frames import Marker, velocity_at
 from ..kinds import Axis, Choice, Flag, MarkerReference, Scalar, Vector
 from ..looks import Contour, Seen, Wheel
-from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
+from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies, switchable
 
 # -- supports ----------------------------------------------------------------------------------------------------------
 
@@ -254,7 +254,7 @@ def _check_blade(e: Entry, values: dict[str, Any]) -> None:
     on_two_bodies(e, "on", values["marker"], values["on"])
 
 
-TYPES = table(
+TYPES = switchable(
     ElementType(
         "rolling",
         "a wheel, ball or smooth convex body that rolls on a plane without slip.",

@@ -1,64 +1,17 @@
-"""Constraint elements that close and open: keys by which any constraint holds for a time, and what only does so."""
+"""Constraint elements that hold for a time only: a marker on a body, the coordinates of a joint."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from ...expr import vectors as vec
 from ...expr.core import Expr
-from ..dimensions import SPIN
-from ..element_type import ElementType, Entry, Types, Where, element, key, table
+from ..element_type import ElementType, Entry, Where, element, key
 from ..frames import Marker, velocity_at
-from ..kinds import LAW, Choice, Fields, Flag, JointReference, Pair, Scalar, SomeNames
+from ..kinds import Choice, JointReference, Pair
 from ..looks import CROSS, Drawn, Seen
-from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
+from .constraint import VELOCITY, Condition, Constraint, ConstraintView, is_switched, on_two_bodies, switchable
 
-#: Of any constraint that may close and open in a run.
-SWITCHING: Fields = {
-    "closes": Scalar("where it falls to 0 the constraint closes: a plastic impact, after which it holds", level=LAW),
-    "opens": Scalar("where it falls to 0 while the constraint holds, it lets go", level=LAW),
-    "closed": Flag("whether it holds at the start of a run; false if closes is given, else true"),
-    "releases": SomeNames("one or several other constraints that let go as it closes, before the impact"),
-    "stabilisation": Scalar(
-        "rate (1/s), greater than 0, at which an error of the equation dies away while it holds",
-        default=10,
-        dimension=SPIN,
-    ),
-}
-
-#: How a condition of a joint without coordinates is written that holds for a time.
-IN_PLACE_OF_JOINTS = (
-    "joints without coordinates, except welds, cannot open; use a constraint of type hold: axes: xyz, turning: xyz "
-    "acts as a weld, axes: xyz without turning as a ball joint, axes: xy, turning: z in the plane"
-)
-
-
-def switchable(types: Types) -> Types:
-    """The types with these keys too."""
-    return {name: _with_keys(result) for name, result in types.items()}
-
-
-def _with_keys(element: ElementType) -> ElementType:
-    return element._replace(keys=element.keys | SWITCHING)
-
-
-def is_switched(values: Mapping[str, Any]) -> bool:
-    """Whether an entry says that a constraint or joint closes or opens."""
-    return not values.keys().isdisjoint(("closes", "opens", "closed"))
-
-
-def state_of(name: str) -> str:
-    """The first-order state that is 1 while the constraint or joint of a name holds."""
-    return f"{name}_closed"
-
-
-def event_of(name: str, key: str) -> str:
-    """The event at which it ``closes`` or ``opens``."""
-    return f"{name}_{key}"
-
-
-# -- what holds for a time only ----------------------------------------------------------------------------------------
 AXES = ("xyz", "xy", "x", "y", "z", "xz", "yz")
 
 
@@ -125,7 +78,7 @@ def _lock(e: Entry) -> Constraint | None:
     return None if velocities is None else Lock(e.name, velocities)
 
 
-TYPES = table(
+TYPES = switchable(
     element(
         Hold,
         "hold",

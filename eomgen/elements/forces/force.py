@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ...expr import vectors as vec
-from ...expr.core import Expr
+from ...expr.core import Expr, Graph
 from ...expr.vectors import Vec3
 from ..element_type import Element
 from ..frames import Marker, MotionView
@@ -191,3 +192,32 @@ class Force(Element):
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""
         return []
+
+
+# -- symbols of reactions ----------------------------------------------------------------------------------------------
+
+
+_MULTIPLIER = re.compile(r"multiplier\((.+)\)\Z")
+_SYMBOL = re.compile(r"reaction\((.+)\)\[([0-5])\]\Z")
+
+
+def reaction_symbol(graph: Graph, joint: str, k: int) -> Expr:
+    """Force (k = 0, 1, 2) or moment (3, 4, 5) that P exerts on S at S, along the axes of S (N, N m)."""
+    return graph.symbol(f"reaction({joint})[{k}]")
+
+
+def reaction_of(symbol: str) -> tuple[str, int] | None:
+    """Joint and component of such a symbol's name; None for other names."""
+    result = _SYMBOL.match(symbol)
+    return (result[1], int(result[2])) if result else None
+
+
+def multiplier_of(symbol: str) -> str | None:
+    """Equation, or element of one equation, of the symbol of a multiplier, ``multiplier(mesh.ratio)``; else None."""
+    result = _MULTIPLIER.match(symbol)
+    return result[1] if result else None
+
+
+def is_reaction(symbol: str) -> bool:
+    """Whether a symbol stands for a reaction or a multiplier."""
+    return symbol.endswith((")", "]")) and (reaction_of(symbol) is not None or multiplier_of(symbol) is not None)

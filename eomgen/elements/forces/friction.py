@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -11,13 +10,13 @@ from typing import Any, ClassVar, NamedTuple
 from ...base.limits.numbers import AT_REST
 from ...base.value_rules import LIMITS, NOT_NEGATIVE, POSITIVE
 from ...expr import vectors as vec
-from ...expr.core import Expr, Graph, sqrt
+from ...expr.core import Expr, sqrt
 from ...expr.records import Record
 from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
 from ..element_type import ElementType, Entry, Law, Types, element, key, table
 from ..kinds import LAW, Choice, Fields, Scalar
-from .force import Force, View, beyond_zero, map_law, where
+from .force import Force, View, beyond_zero, map_law, reaction_symbol, where
 from .paths import ON_JOINT, Path, PathForce, read_coordinate
 from .springs import Damper
 
@@ -414,35 +413,6 @@ def friction_key(types: Types, sole: str = "") -> Law:
 
 
 FRICTION = friction_key(FRICTIONS)
-
-
-# -- symbols of reactions ----------------------------------------------------------------------------------------------
-
-
-_MULTIPLIER = re.compile(r"multiplier\((.+)\)\Z")
-_SYMBOL = re.compile(r"reaction\((.+)\)\[([0-5])\]\Z")
-
-
-def reaction_symbol(graph: Graph, joint: str, k: int) -> Expr:
-    """Force (k = 0, 1, 2) or moment (3, 4, 5) that P exerts on S at S, along the axes of S (N, N m)."""
-    return graph.symbol(f"reaction({joint})[{k}]")
-
-
-def reaction_of(symbol: str) -> tuple[str, int] | None:
-    """Joint and component of such a symbol's name; None for other names."""
-    result = _SYMBOL.match(symbol)
-    return (result[1], int(result[2])) if result else None
-
-
-def multiplier_of(symbol: str) -> str | None:
-    """Equation, or element of one equation, of the symbol of a multiplier, ``multiplier(mesh.ratio)``; else None."""
-    result = _MULTIPLIER.match(symbol)
-    return result[1] if result else None
-
-
-def is_reaction(symbol: str) -> bool:
-    """Whether a symbol stands for a reaction or a multiplier."""
-    return symbol.endswith((")", "]")) and (reaction_of(symbol) is not None or multiplier_of(symbol) is not None)
 
 
 # -- by reactions ------------------------------------------------------------------------------------------------------

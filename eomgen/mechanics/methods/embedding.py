@@ -22,7 +22,7 @@ from ...expr.schedule import count
 from ...expr.spatial import Twist, Wrench, add, dot
 from ...expr.tensors import add_matrices, rotate
 from ...expr.vectors import Mat3, Rows, Vec3
-from .. import Kinematics, Link
+from .. import Kinematics
 from ..kinematics import joint_rates, slide_accelerations
 from ..link_frames import (
     Resolved,
@@ -34,7 +34,7 @@ from ..link_frames import (
     turn_forces,
     turn_links,
 )
-from ..tree import SpatialInertia
+from ..tree import Link, SpatialInertia
 from ..wrenches import applied_wrenches, coordinate_forces, cut_drives, drive_inertias, kinetic_energy, potential_energy
 from .recursions import along_joints, composite_mass_matrix
 from .tree_equations import TreeEquations

@@ -9,7 +9,7 @@ of their velocities, S has one reverse gradient, and M is its Hessian: no recurs
 
 from __future__ import annotations
 
-from ...elements.forces import Load
+from ...elements.forces.force import Load
 from ...expr import vectors as vec
 from ...expr.core import Expr, substitute
 from ...expr.differentiate import gradient, hessian

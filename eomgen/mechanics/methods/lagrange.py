@@ -9,7 +9,7 @@ d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v (Meirovitch, Methods of Ana
 
 from __future__ import annotations
 
-from ...elements.forces import CoordinateLoad, MarkerLoad
+from ...elements.forces.force import CoordinateLoad, MarkerLoad
 from ...elements.frames import GROUND
 from ...expr import vectors as vec
 from ...expr.core import Expr

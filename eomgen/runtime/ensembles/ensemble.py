@@ -20,9 +20,9 @@ from ...base.texts import TIME, html_table, label
 from ...base.value_rules import read_count
 from ...errors import UsageError, bad_data, cannot, ill_typed, no_choice, off_range, untrue
 from ..argument_checks import check_names, require, require_size, unknown, without_dots
-from ..failure import WORDS, place
 from ..identity import code_digest, digest, origin, plain, spell_input
 from ..inputs import Forcing, Signal, fill_rates, rate_pairs
+from ..kernels import WORDS, place
 from ..plotting import printed_names
 from ..refusals import refuse_moreau, require_support
 from ..runs.bound_run import Progress, wanted

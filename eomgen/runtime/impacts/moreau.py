@@ -55,14 +55,13 @@ from ...errors import (
     untrue,
 )
 from ..argument_checks import check_names, read_number, require_size, require_steps, unknown
-from ..columns import Columns
 from ..inputs import Forcing
 from ..kernels import LazyCore, eager
 from ..runs.bound_run import watch_run
 from ..runs.events import Events, is_inner_run
 from ..runs.integrate import Solution, record
 from ..runs.run_arguments import check_step, deep_start, find_state, ordered_times, set_up
-from ..trajectory import Span, Start, Trajectory
+from ..trajectory import Columns, Span, Start, Trajectory
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel

@@ -30,14 +30,13 @@ from ...errors import (
     no_such,
 )
 from ..argument_checks import read_number, read_numbers
-from ..columns import Columns, Residuals, describe
-from ..failure import place
 from ..inputs import Forcing
+from ..kernels import place
 from ..refusals import not_driven
 from ..runs.events import Events
 from ..runs.integrate import header_of, integrate
 from ..runs.run_arguments import ordered_times, set_up
-from ..trajectory import Span, Start, Trajectory, last_state
+from ..trajectory import Columns, Residuals, Span, Start, Trajectory, describe, last_state
 from .followed_path import DrivenCoordinates, DrivenPath, FollowedPath, Singular
 
 if TYPE_CHECKING:

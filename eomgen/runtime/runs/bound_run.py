@@ -30,8 +30,8 @@ from ...base.limits.runs import (
 )
 from ...errors import EvaluationError, SimulationError
 from ..argument_checks import read_flag
-from ..failure import place
 from ..inputs import Forcing
+from ..kernels import place
 
 if TYPE_CHECKING:
     from ..bound_model import BoundModel

@@ -19,10 +19,9 @@ import numpy as np
 from ...base.algebra import Array
 from ...errors import SimulationError, calls_within, ill_shaped, no_choice
 from ..argument_checks import check_names, require, unknown
-from ..columns import Columns, describe, project, units_of_layout
 from ..inputs import Forcing
 from ..layout import Layout
-from ..trajectory import Trajectory
+from ..trajectory import Columns, Trajectory, describe, project, units_of_layout
 from .events import is_inner_run, warn_of_unknown
 
 if TYPE_CHECKING:
