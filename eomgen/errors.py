@@ -222,8 +222,8 @@ class ExpressionError(EomgenError, ValueError, code="EG-EXPRESSION"):
 
     def place(self) -> str:
         """The message with the column and the expression (shortened)."""
-        shown = self.text if len(self.text) <= 60 else self.text[:57] + "..."
-        return f"{self.message} in column {self.column} of {shown!r}" if self.column else self.message
+        text = self.text if len(self.text) <= 60 else self.text[:57] + "..."
+        return f"{self.message} in column {self.column} of {text!r}" if self.column else self.message
 
 
 class AssemblyError(EomgenError, code="EG-LOOP-OPEN"):

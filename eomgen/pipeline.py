@@ -82,15 +82,15 @@ def compile_core(
         return cast("Core", find_function(row.load)(program, options, seconds, functions))
 
     def load_lazy(group: str) -> Core:
-        return load(build(equations, target, [name for name, of in late.items() if of == group]), {})
+        return load(build(equations, target, [name for name, of in lazy.items() if of == group]), {})
 
     if kernels is not None:
         return load(build(equations, target, kernels), {})
     with timed(equations.seconds, "program"):
         program = build(equations, target, [k.name for k in KERNELS if not k.late])
     core = load(program, equations.seconds)
-    late = {k.name: str(k.late) for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
-    return LazyCore(core, list(late), load_lazy)
+    lazy = {k.name: str(k.late) for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
+    return LazyCore(core, list(lazy), load_lazy)
 
 
 def make_functions(equations: Derivation, target: str, **options: Any) -> Any:

@@ -151,8 +151,8 @@ def projected_directions(module: BoundModel, t: float, x: Array, jacobian: Array
         dq = np.asarray(space.rates(q, dz @ space.velocities(q, unit)) + space.stretch(q, unit))
     dq = np.hstack([dq, np.zeros((n_q, layout.n_v))])
     result = np.vstack([dq, _velocity_change(layout, x, jacobian[:n_q], dq)])
-    own = slice(layout.n_x - len(layout.states), None)
-    result[own, own] = np.eye(len(layout.states))
+    of_states = slice(layout.n_x - len(layout.states), None)
+    result[of_states, of_states] = np.eye(len(layout.states))
     return result
 
 
@@ -188,7 +188,7 @@ def balance_forces(
     t: float,
     q: Array,
     s: Array,
-    held: Array | None = None,
+    fixed: Array | None = None,
     preferred: Indices | None = None,
 ) -> Balance:
     """The forces at a position on the constraints.
@@ -200,7 +200,7 @@ def balance_forces(
     q : (n_q,) array
     s : (n_s,) array
         First-order states.
-    held : (k, n_v) array, optional
+    fixed : (k, n_v) array, optional
         Gradients of held coordinates by displacements, which no virtual displacement may change.
     preferred : (n_dof,) indices, optional
     """
@@ -219,8 +219,8 @@ def balance_forces(
         tree = -module.kernels.bias(t, x)
     wider = _displacements(J[:n_h], split.independent) if n_h < layout.n_c else split
     surplus = np.setdiff1d(wider.independent, split.independent)
-    if held is not None and len(held):
-        holding = unit_rows(held * scales.q)
+    if fixed is not None and len(fixed):
+        holding = unit_rows(fixed * scales.q)
         stacked = np.vstack([J, holding])
         split = partition(stacked, rank(stacked).rank, order if preferred is None else preferred)
         wider = _displacements(np.vstack([J[:n_h], holding]), split.independent) if n_h < layout.n_c else split
@@ -254,7 +254,7 @@ def slopes(
     module: BoundModel,
     t: float,
     x: Array,
-    held: Array,
+    fixed: Array,
     held_by: Array,
     parameters: Sequence[int],
     inputs: Sequence[int],
@@ -264,7 +264,7 @@ def slopes(
     Parameters
     ----------
     x : (n_x,) array
-    held : (k_h, n_v) array
+    fixed : (k_h, n_v) array
         Gradients of held coordinates by displacements: unknowns leave them where they are.
     held_by : (k_h, n_p) array
         Their derivatives by the parameters, for coordinates of cut joints.
@@ -282,7 +282,7 @@ def slopes(
     if len(parameters) and n_h:
         moved = module.kernels.assembly_jacobian(x, t=t)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
         C_q = module.kernels.constraint_jacobian(x[:n_q], t=t)[:n_h]
-        stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
+        stacked = np.vstack([scales.jacobian(C_q), fixed * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
         step = -algebra.lstsq(stacked, wanted, rcond=STATE)
         motion[:, : len(parameters)] = scales.q[:, None] * step

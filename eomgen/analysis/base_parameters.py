@@ -133,12 +133,12 @@ def fit_base(
             "parameters needs a tree; use mod.fit(data, parameters)"
         )
     measured = np.asarray(read_numbers("tau", tau), dtype=float)
-    own = base.regressor(q, v, a)
-    if measured.ndim != 2 or own.ndim != 3 or measured.shape != own.shape[::2]:
+    rows = base.regressor(q, v, a)
+    if measured.ndim != 2 or rows.ndim != 3 or measured.shape != rows.shape[::2]:
         raise ill_shaped(f"tau must have shape ({module.n_v}, k) with k samples, as v has, not {measured.shape}")
     rest, further = _not_inertial(base, (q, v, a), read_names("also", also), u)
     names = (*base.names, *further)
-    data = _Data(np.concatenate([own, *(column[:, None] for column in further.values())], axis=1), measured - rest)
+    data = _Data(np.concatenate([rows, *(column[:, None] for column in further.values())], axis=1), measured - rest)
     if data.count <= len(names):
         raise ill_shaped(f"{data.count} finite values of tau cannot determine {len(names)} parameters")
     if sigma is not None:
@@ -323,10 +323,10 @@ class BaseParameters(Result):
         UsageError
             An unknown name.
         """
-        own = standard_parameters(self.module, p)
+        standard = standard_parameters(self.module, p)
         check_names("standard parameter", parameters or (), self.standard)
-        own |= {name: float(value) for name, value in (parameters or {}).items()}
-        values = self.combination @ np.array([own[name] for name in self.standard])
+        standard |= {name: float(value) for name, value in (parameters or {}).items()}
+        values = self.combination @ np.array([standard[name] for name in self.standard])
         return dict(zip(self.names, map(float, values), strict=True))
 
     @property
@@ -448,11 +448,11 @@ def _independent(W: Array, sizes: Array, least: float) -> tuple[list[int], float
         rest = W[:, k] / sizes[k]
         for _ in range(2):  # twice is enough (W. Kahan; Parlett, The Symmetric Eigenvalue Problem, 1980, sec. 6-9)
             rest = rest - basis.T @ (basis @ rest)
-        own = float(np.linalg.norm(rest))
-        if own > least:
-            basis = np.vstack([basis, rest / own])
+        remainder = float(np.linalg.norm(rest))
+        if remainder > least:
+            basis = np.vstack([basis, rest / remainder])
             chosen.append(k)
-            weakest = min(weakest, own)
+            weakest = min(weakest, remainder)
     return chosen, weakest
 
 

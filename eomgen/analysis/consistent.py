@@ -87,22 +87,22 @@ def consistent(
             "consistent() works for models with q' = v only, and the rates of this model's coordinates are given; "
             "use project(x)"
         )
-    held = read_names("hold", hold)
+    fixed = read_names("hold", hold)
     if isinstance(weights, Mapping):
         weights = {name: read_number(f"weights: that of {name}", weight) for name, weight in weights.items()}
     elif weights is not None and not (isinstance(weights, str) and weights == "mass"):
         raise ill_typed(f"weights must be a mapping of names to weights, or 'mass', not {shown(weights)}")
-    _check_names(layout, weights, held)
+    _check_names(layout, weights, fixed)
     if not layout.n_c:
         return np.asarray(module.project(state, t=t))
-    q = _positions(module, state[: layout.n_q], t, weights, held)
-    return np.concatenate([q, _velocities(module, q, state[layout.n_q :], t, weights, held)])
+    q = _positions(module, state[: layout.n_q], t, weights, fixed)
+    return np.concatenate([q, _velocities(module, q, state[layout.n_q :], t, weights, fixed)])
 
 
-def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held: Sequence[str]) -> None:
+def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, fixed: Sequence[str]) -> None:
     raw = () if weights is None or isinstance(weights, str) else read_names("weights", weights)
     allowed = tuple(dict.fromkeys((*layout.velocity_labels, *layout.v)))
-    for place, names in (("weights", raw), ("hold", held)):
+    for place, names in (("weights", raw), ("hold", fixed)):
         check_names("coordinate or velocity", names, allowed, place=place)
     if isinstance(weights, Mapping):
         for name, weight in weights.items():
@@ -132,12 +132,12 @@ def _metric(
 
 
 def _positions(
-    module: BoundModel, start: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
+    module: BoundModel, start: Array, t: float, weights: Mapping[str, float] | str | None, fixed: Sequence[str]
 ) -> Array:
     """The q nearest to the start with C(q, t) = 0."""
     layout = module.layout
     start = start if layout.space is None else layout.space.normalised(start)
-    free = np.array([name not in held for name in layout.velocity_labels])
+    free = np.array([name not in fixed for name in layout.velocity_labels])
     n_h = layout.n_h
     if not n_h:
         return start
@@ -155,10 +155,10 @@ def _positions(
         return np.asarray(L.T @ (scales.q * scales.distance(q, start))[free])
 
     q = nearest(start)
-    if q is None and not held:  # the metric leads astray far from the constraints: begin at the projection
+    if q is None and not fixed:  # the metric leads astray far from the constraints: begin at the projection
         q = nearest(np.asarray(module.project(np.concatenate([start, np.zeros(layout.n_v)]), t=t))[: layout.n_q])
     if q is None:
-        kept = f" with {', '.join(held)} held" if held else ""
+        kept = f" with {', '.join(fixed)} held" if fixed else ""
         C = system.evaluate(start)[0]
         worst = layout.constraint_labels[int(np.abs(C).argmax())]
         raise ProjectionError(
@@ -168,9 +168,9 @@ def _positions(
     share = 1.0
     for _ in range(STEPS if free.any() else 0):
         _, sizes, Vt = algebra.svd(system.evaluate(q)[1] @ metric, full_matrices=False)
-        across = Vt[sizes > RANK * sizes[0]]
+        normal = Vt[sizes > RANK * sizes[0]]
         y = change(q)
-        slope = y - across.T @ (across @ y)
+        slope = y - normal.T @ (normal @ y)
         step = -share * (metric @ slope)
         if largest(step) <= share * NEAREST:
             break
@@ -185,11 +185,11 @@ def _positions(
 
 
 def _velocities(
-    module: BoundModel, q: Array, v: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
+    module: BoundModel, q: Array, v: Array, t: float, weights: Mapping[str, float] | str | None, fixed: Sequence[str]
 ) -> Array:
     """The v nearest to the given ones that the constraints allow."""
     layout, scales = module.layout, module.layout.scales
-    free = np.array([name not in held for name in layout.v])
+    free = np.array([name not in fixed for name in layout.v])
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
     J = module.kernels.constraint_jacobian(q, t=t)[:, free] / scales.c[:, None]
     J = algebra.solve(L, J.T).T
@@ -206,7 +206,7 @@ def _velocities(
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
     if largest(rate) > ACCEPTED * max(1.0, scales.speed(v)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]
-        kept = f" with {', '.join(held)} held" if held else ""
+        kept = f" with {', '.join(fixed)} held" if fixed else ""
         raise ProjectionError(
             f"no consistent velocities were found{kept}: the rate of the constraint {worst} stays {largest(rate):.2g}"
         )

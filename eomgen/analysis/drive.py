@@ -185,7 +185,7 @@ def _check_inputs(
     inputs = [(i, layout.u.index(name)) for i, name in enumerate(names) if name in layout.u]
     if len(inputs) < 2:
         return
-    others = [i for i in range(len(names)) if i not in [own for own, _ in inputs]]
+    others = [i for i in range(len(names)) if i not in [driven for driven, _ in inputs]]
     for k, B in enumerate(bases):
         u = module.u
         for i, j in inputs:
@@ -358,7 +358,7 @@ def _with_drives(states: ProjectedStates, names: Sequence[str], a: Array, multip
             u[layout.u.index(names[i])] = forces[i, k]
         some = slice(k, k + 1)
         one = states._replace(module=module.bind(u=u), t=states.t[some], x=np.ascontiguousarray(states.x[:, some]))
-        own = {j: force[some] for j, force in cut.items()}
-        now, held = (np.ascontiguousarray(y[:, some]) for y in (a, multipliers))
-        parts.append(find_reactions(one, now, held, own)[0])
+        drives = {j: force[some] for j, force in cut.items()}
+        now, reactions = (np.ascontiguousarray(y[:, some]) for y in (a, multipliers))
+        parts.append(find_reactions(one, now, reactions, drives)[0])
     return np.concatenate(parts, axis=-1)

@@ -96,8 +96,8 @@ class Equilibrium(Result):
             max(abs(self.coordinates[name]), typical.get(unit, 0.0))
             for name, unit in zip(self.coordinates, units, strict=True)
         ]
-        shown = without_noise([*self.coordinates.values()], units, sizes)
-        lines = [(name, f"{value:.10g}") for name, value in zip(self.coordinates, shown, strict=True)]
+        rounded = without_noise([*self.coordinates.values()], units, sizes)
+        lines = [(name, f"{value:.10g}") for name, value in zip(self.coordinates, rounded, strict=True)]
         lines += [(name, f"{value:.10g}") for name, value in self.states.items()]
         lines += [(f"{name} (solved)", f"{value:.10g}") for name, value in self.unknowns.items()]
         lines += [(f"support at {name}", f"{value:.6g}") for name, value in self.supports.items()]
@@ -110,8 +110,8 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
     """The result at a balanced position."""
     t, module, q, s = search.t, point.module, point.q, point.s
     layout = module.layout
-    held = search.gradients(module, q) if search.supported else None
-    here = balance_forces(module, t, q, s, held)
+    fixed = search.gradients(module, q) if search.supported else None
+    here = balance_forces(module, t, q, s, fixed)
     result: dict[str, Any] = {
         "coordinates": read_coordinates(module, q, t),
         "states": dict(zip(layout.states, s.tolist(), strict=True)),
@@ -121,12 +121,12 @@ def describe(search: Search, point: SearchPoint, steps: int) -> Equilibrium:
         "linear": None,
         "steps": steps,
     }
-    if held is None:
+    if fixed is None:
         linear = linearize(module, here.x, t)
         result |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
         free = balance_forces(module, t, q, s)
-        pull = algebra.lstsq((held @ free.B).T, free.forces, rcond=STATE)
+        pull = algebra.lstsq((fixed @ free.B).T, free.forces, rcond=STATE)
         rows = search.rows_to_hold(module, q)
         result["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
         A, second = _motion_with_holds(search, module, here, t)
@@ -297,7 +297,7 @@ def _states(module: BoundModel, guess: Any) -> Array:
     return np.array([read_number(name, values.get(name, 0.0)) for name in layout.states])
 
 
-def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) -> Array:
+def _start(module: BoundModel, guess: Any, fixed: Mapping[str, float], t: float) -> Array:
     """A closed position near the guess that has the held values."""
     initial = Initial(module.kernels, t, guess if isinstance(guess, Mapping) else ())
     if guess is None or isinstance(guess, Mapping):
@@ -305,18 +305,18 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
         values = {name: read_number(name, value) for name, value in named.items()}
         if initial.sort(values).rates:
             raise ill_placed("guess is a position: name coordinates in it, not rates")
-        loose = {name: value for name, value in values.items() if name not in held}
+        loose = {name: value for name, value in values.items() if name not in fixed}
         q = initial.from_guess(loose) if loose else initial.assembled({})
     else:
         q = np.array(read_numbers("guess", guess))
         if q.shape not in ((module.n_q,), (module.n_x,)):
             raise ill_shaped(f"guess must name coordinates or have shape ({module.n_q},), not {q.shape}")
         q = q[: module.n_q]
-    if held:
+    if fixed:
         if not module.layout.n_h:
-            return initial.system.with_values(q, held)
+            return initial.system.with_values(q, fixed)
         try:
-            return initial.follow(q, held)
+            return initial.follow(q, fixed)
         except AssemblyError:
-            return initial.system.close(q, held).q
+            return initial.system.close(q, fixed).q
     return initial.system.close(q, {}).q if module.layout.n_h else q

@@ -149,20 +149,20 @@ def _numbers(values: Any) -> Array:
         raise ValueError("is not a list of numbers") from None
 
 
-def _unit_factor(raw: Any, own: str) -> float:
+def _unit_factor(raw: Any, declared: str) -> float:
     """What values in the unit that a table tells are multiplied by; 1 where it tells none."""
-    if not raw or raw == own:
+    if not raw or raw == declared:
         return 1.0
     try:
         from ..model.units import UnitError, read_unit
     except ModuleNotFoundError:
-        raise ValueError(f"is in {raw!r}; only eomgen itself converts units, so give it in {own!r}") from None
+        raise ValueError(f"is in {raw!r}; only eomgen itself converts units, so give it in {declared!r}") from None
     try:
-        unit, wanted = read_unit(str(raw)), read_unit(own)
+        unit, wanted = read_unit(str(raw)), read_unit(declared)
     except UnitError as error:
         raise ValueError(f"is in {raw!r}: {error}; {error.remedy}") from None
-    if own and unit.dimension != wanted.dimension:
-        raise ValueError(f"is in {raw!r}, which cannot be turned into {own!r}")
+    if declared and unit.dimension != wanted.dimension:
+        raise ValueError(f"is in {raw!r}, which cannot be turned into {declared!r}")
     return unit.size / wanted.size
 
 

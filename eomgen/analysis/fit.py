@@ -408,7 +408,7 @@ class _Problem:
 
     def noise(self, values: Array, name: str) -> float:
         """Standard deviation of a column's residuals, as many of the unknowns taken off as its share of the values."""
-        total = own = 0
+        total = of_run = 0
         squares = 0.0
         for one in self.experiments:
             run = self.run(values, one)
@@ -416,9 +416,9 @@ class _Problem:
                 there = np.isfinite(measured)
                 total += int(there.sum())
                 if column == name:
-                    own += int(there.sum())
+                    of_run += int(there.sum())
                     squares += float(((run[column][there] - measured[there]) ** 2).sum())
-        free = own * (1.0 - len(self.names) / total)
+        free = of_run * (1.0 - len(self.names) / total)
         return max(float(np.sqrt(squares / free)), MEASURED * self.spread(name))
 
 

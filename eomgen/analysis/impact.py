@@ -210,8 +210,8 @@ def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]
     """The impact of some gaps of a run, with inputs as they are then."""
     u = gaps.inputs(t, x)
     module = gaps.module if u is None else gaps.module.bind(None, u)
-    own, states = Gaps(module, tuple(restitutions), gaps.forcing), one_state(module, t, x)
-    return _strike_gaps(states, own, own.normals(t, states.x[:, 0]), restitutions, (), rough)
+    striking, states = Gaps(module, tuple(restitutions), gaps.forcing), one_state(module, t, x)
+    return _strike_gaps(states, striking, striking.normals(t, states.x[:, 0]), restitutions, (), rough)
 
 
 def _require_closed(gaps: Gaps, states: ProjectedStates) -> None:
@@ -239,8 +239,8 @@ def _strike_gaps(
     rates = gaps.rates(t, x, rows)
     sliding = find_sliding(gaps.module, rough, gaps.names, t, x, gaps.forcing)
     if locked:
-        held = np.array([coordinate_slopes(states, name)[:, 0] for name in locked])
-        rows, rates = np.vstack([rows, held]), np.concatenate([rates, held @ states.v[:, 0]])
+        locks = np.array([coordinate_slopes(states, name)[:, 0] for name in locked])
+        rows, rates = np.vstack([rows, locks]), np.concatenate([rates, locks @ states.v[:, 0]])
     return apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked), sliding)
 
 
@@ -369,13 +369,13 @@ class GapEvents(Events):
         return float(self._values[i])
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
-        own, known = [i for i in fired if i < self._first], len(self.impacts)
-        x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action != WAIT])
+        gaps, known = [i for i in fired if i < self._first], len(self.impacts)
+        x = super().reset(module, forcing, t, x, [i for i in gaps if self.model[i].action != WAIT])
         closed = self.gaps.values(t, x) <= self.limits
         closed[[i - self._first for i in fired if i >= self._first]] = True
         x = self._impact_of(t, x, closed)  # before the model's own impact of the same gap, which then finds it opening
-        x = super().reset(module, forcing, t, x, [i for i in own if self.model[i].action == WAIT])
-        if len(own) < len(fired):
+        x = super().reset(module, forcing, t, x, [i for i in gaps if self.model[i].action == WAIT])
+        if len(gaps) < len(fired):
             soon = t - self._last < CROWDED * (self.end - self._start) and len(self.impacts) == known
             self._last, self._no_impacts = t, self._no_impacts + 1 if soon else 0
             if self._no_impacts > NO_IMPACTS:

@@ -159,8 +159,8 @@ def analyse(module: BoundModel, requested: Range, initial: Start, partial: bool)
     driven = DrivenCoordinates(module, names)
     further = driven.prescribed_values(q, start_t)[len(requested.names) :]
     start_y = driven.prescribed_values(q, start_t)
-    led = len(requested.names)
-    for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as requested
+    count = len(requested.names)
+    for k in np.flatnonzero(driven.wraps[:count]):  # the same angle, counted as requested
         start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
     rest = np.repeat(further[:, None], len(requested.t), axis=1)
     still = np.zeros_like(rest)
@@ -173,7 +173,7 @@ def analyse(module: BoundModel, requested: Range, initial: Start, partial: bool)
     )
     _refuse_long_ways(driven, names, np.column_stack([start_y, requested.y]))
     q = follow_to_start(driven, q, (start_t, start_y), (t0, requested.y[:, 0]))
-    return follow_range(driven, requested, q, partial, led)
+    return follow_range(driven, requested, q, partial, count)
 
 
 def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array) -> None:
@@ -188,7 +188,7 @@ def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array)
         )
 
 
-def follow_range(driven: DrivenCoordinates, requested: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
+def follow_range(driven: DrivenCoordinates, requested: Range, q: Array, partial: bool, size: int) -> KinematicAnalysis:
     """Straight pieces one after the other."""
     n = len(requested.t)
     pieces = _pieces(driven, requested)
@@ -224,7 +224,7 @@ def follow_range(driven: DrivenCoordinates, requested: Range, q: Array, partial:
     x = np.vstack([positions.T, np.zeros((driven.layout.n_v, len(times)))])
     order = np.argsort(np.concatenate([along_all, *places]), kind="stable")
     passed = times, x, np.repeat(driven.module.u[:, None], len(times), axis=1), order
-    result = keep(driven, requested.t[:count], columns, collected, stop, n, requested.names[:led], passed=passed)
+    result = keep(driven, requested.t[:count], columns, collected, stop, n, requested.names[:size], passed=passed)
     if count < n and not partial:
         gap = (
             ""

@@ -189,9 +189,9 @@ def linearize(
     states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
     mass = tangent.B.T @ module.kernels.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
-    own = residual_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
+    residual = residual_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
     return Linearization(
-        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
+        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, residual
     )
 
 

@@ -41,7 +41,7 @@ SWEEPS = 12  #: of Jacobi's method, at most
 
 
 def stability_of_matrix(
-    A: Array, own: Array | None = None, error: float = ROUNDING, errors: Array | None = None
+    A: Array, residual: Array | None = None, error: float = ROUNDING, errors: Array | None = None
 ) -> str:
     """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
 
@@ -51,7 +51,7 @@ def stability_of_matrix(
     ----------
     A : (n, n) array
         Of s' = A s (1/s).
-    own : (n_dof,) array, optional
+    residual : (n_dof,) array, optional
         Accelerations of the model's own forces in units of the last n_dof states' displacements (1/s^2): slopes of
         forces far below them are rounding.
     error : float
@@ -61,13 +61,13 @@ def stability_of_matrix(
     """
     if not A.size:
         return "no freedom"
-    scale = _balance(A, own)
+    scale = _balance(A, residual)
     balanced = A * scale / scale[:, None]
     values = algebra.eigvals(balanced)
     far = error * float(algebra.norm2(balanced))
     zero = np.array([_reaches_axis(balanced, complex(value), far) for value in values])
     if errors is not None:
-        scale = _balance(np.maximum(np.abs(A), errors), own)  # so that what is but an error is not blown up
+        scale = _balance(np.maximum(np.abs(A), errors), residual)  # so that what is but an error is not blown up
         balanced, scaled = A * scale / scale[:, None], errors * scale / scale[:, None]
         for k in np.flatnonzero(~zero & (values.real > 0.0)):
             zero[k] = _reaches_axis_in_cluster(balanced, scaled, np.abs(values), complex(values[k]))
@@ -106,13 +106,13 @@ def _reaches_axis_in_cluster(A: Array, errors: Array, sizes: Array, value: compl
     return _reaches_axis(left @ A @ basis, value, far)
 
 
-def _balance(A: Array, own: Array | None) -> Array:
+def _balance(A: Array, residual: Array | None) -> Array:
     """Units of the states that make rows and columns alike; forces of the model keep rows from being blown up."""
     sizes = np.abs(A)
-    if own is not None and len(own) and len(A) >= 2 * len(own):
-        n = len(own)
+    if residual is not None and len(residual) and len(A) >= 2 * len(residual):
+        n = len(residual)
         rows = np.arange(len(A) - n, len(A))
-        sizes[rows, rows - n] = np.maximum(sizes[rows, rows - n], own)
+        sizes[rows, rows - n] = np.maximum(sizes[rows, rows - n], residual)
         sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], TINY)
     np.fill_diagonal(sizes, 0.0)
     d = np.ones(len(A))
@@ -205,7 +205,7 @@ class SecondOrder(NamedTuple):
     K_error: Array  #: (n, n)
 
 
-def stiffness_errors(M: Array, slopes: Array, own: Array, sizes: Array, error: float = MARGIN) -> Array:
+def stiffness_errors(M: Array, slopes: Array, residual: Array, sizes: Array, error: float = MARGIN) -> Array:
     """Bounds (n, n_z) for the errors that rounding leaves in K.
 
     Of the sums that make an acceleration, of the forces behind them, and of what cancels within one stiff force whose
@@ -216,7 +216,7 @@ def stiffness_errors(M: Array, slopes: Array, own: Array, sizes: Array, error: f
     M : (n, n) array
     slopes : (n, n_z) array
         Of accelerations by displacements; -M^-1 K.
-    own : (n,) array
+    residual : (n,) array
         Accelerations of the model's own forces, each without the others, per unit displacement.
     sizes : (n_z,) array
         Unit displacements.
@@ -224,8 +224,8 @@ def stiffness_errors(M: Array, slopes: Array, own: Array, sizes: Array, error: f
         Relative error of forces.
     """
     local = np.abs(M) @ np.abs(slopes)
-    if len(own):
-        local[:, : len(own)] += np.diag(M.diagonal() * own)
+    if len(residual):
+        local[:, : len(residual)] += np.diag(M.diagonal() * residual)
     n = len(M)
     stiffest = float((sizes[:n] * np.abs(M @ slopes)[:, :n].diagonal() * sizes[:n]).max(initial=0.0))
     rows = np.ones(n)  # of first-order states, which are no displacements
@@ -252,7 +252,7 @@ def uncertainty(squares: Array, shapes: Array, K_error: Array) -> Array:
 def verdict(
     second: SecondOrder | None,
     A: Array,
-    own: Array | None = None,
+    residual: Array | None = None,
     error: float = ROUNDING,
     errors: Array | None = None,
 ) -> str:
@@ -267,15 +267,15 @@ def verdict(
         As for :func:`~.linearization.stability_of_matrix`, which decides where the signs of K and C do not.
     """
     if second is None or not A.size or not _is_dissipative(second):
-        return stability_of_matrix(A, own, error, errors)
+        return stability_of_matrix(A, residual, error, errors)
     squares, shapes = symmetric_modes(second.M, 0.5 * (second.K + second.K.T))
     bound = uncertainty(squares, shapes, second.K_error)
     if (squares < -bound).any():
         gyroscopic = np.abs(second.C - second.C.T) > second.C_error + second.C_error.T
-        return stability_of_matrix(A, own, error, errors) if gyroscopic.any() else "unstable"
+        return stability_of_matrix(A, residual, error, errors) if gyroscopic.any() else "unstable"
     if (squares <= bound).any():
         return "marginal"
-    result = stability_of_matrix(A, own, error, errors)
+    result = stability_of_matrix(A, residual, error, errors)
     return result if result == "asymptotically stable" else "stable (undamped)"  # a least potential
 
 
@@ -345,9 +345,9 @@ class Linearization(Result):
         drift: Array,
         second: tuple[Array, Array, Array] | None = None,
         tangent: TangentSpace | None = None,
-        own: Array | None = None,
+        residual: Array | None = None,
     ) -> None:
-        self.own = own  # accelerations of the model's own forces, scaled (1/s^2)
+        self.own = residual  # accelerations of the model's own forces, scaled (1/s^2)
         self.layout, self.name, self.t, self.x, self.u = layout, layout.name, t, x, u
         self.A, self.B, self.C, self.D = matrices
         self.states, self.inputs, self.outputs, self.drift = states, layout.u, layout.y, drift
@@ -466,8 +466,8 @@ class Linearization(Result):
         assert self.own is not None
         assert self.tangent is not None
         n = len(self.position_names)
-        own = np.zeros(0) if n != len(self.mass) else self.own
-        return stiffness_errors(self.mass, self.A[n:, :n], own, self.layout.place_scales.q[self.tangent.positions])
+        residual = np.zeros(0) if n != len(self.mass) else self.own
+        return stiffness_errors(self.mass, self.A[n:, :n], residual, self.layout.place_scales.q[self.tangent.positions])
 
     def _second(self) -> SecondOrder | None:
         """The equations of second order, where z' = w and nothing accelerates."""

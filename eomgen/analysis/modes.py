@@ -134,8 +134,8 @@ class Modes(Result):
 
     @property
     def _with_damping(self) -> list[tuple[str, str]]:
-        shown = ((mode.eigenvalue, mode.ratio if abs(mode.ratio) > SHOWN_COMPLEX else 0.0) for mode in self.damped)
-        return [("with damping", f"{number(value)}, ratio {ratio:.4g}") for value, ratio in shown]
+        rounded = ((mode.eigenvalue, mode.ratio if abs(mode.ratio) > SHOWN_COMPLEX else 0.0) for mode in self.damped)
+        return [("with damping", f"{number(value)}, ratio {ratio:.4g}") for value, ratio in rounded]
 
     def _table(self) -> str:
         """Frequencies and shapes, a row for each mode, and the eigenvalues with damping, for notebooks."""
@@ -196,9 +196,9 @@ class Modes(Result):
         if self._module.info.picture is None or not len(self.squares):
             return table
         swinging = [k for k in range(len(self.squares)) if self.hertz[k]] or list(range(len(self.squares)))
-        shown = [self._shown(k) for k in swinging[:SHAPES]]
+        pictures = [self._shown(k) for k in swinging[:SHAPES]]
         try:
-            data = self._show().swinging_gif(self._module, self.linear.x, shown)
+            data = self._show().swinging_gif(self._module, self.linear.x, pictures)
         except EomgenError as error:
             return f"{table}<p><i>no picture: {html_text(str(error).partition(chr(10))[0])}</i></p>"
         return table + image_html(data, "gif")

@@ -193,12 +193,12 @@ def element_wrenches(states: ProjectedStates, table: Mapping[str, Any], geometry
     for e in range(len(rows)):
         passed = transmitted(table, geometry, geometry.rows[rows[e]])
         for _, _, joint, _ in table["tree"]:
-            own = free_of(table, joint)
-            if not own:
+            free = free_of(table, joint)
+            if not free:
                 continue
-            forces, _ = along_free(geometry.free[own], passed[joint])
-            rest = C_q[:, e, [table["velocities"][i] for i in own]].T - forces
-            couple = _driving(geometry.free[own], rest)
+            forces, _ = along_free(geometry.free[free], passed[joint])
+            rest = C_q[:, e, [table["velocities"][i] for i in free]].T - forces
+            couple = _driving(geometry.free[free], rest)
             for body, sign in zip(table["ends"][joint], (-1.0, 1.0), strict=True):
                 if body != GROUND:
                     result[e, body] += sign * shift(couple, geometry.points[joint], geometry.origins[body])
@@ -279,9 +279,9 @@ def self_stresses(
             result.append(along)
             rest.append(scaled - B @ along)
     result.append(np.broadcast_to(np.eye(width)[starts[-2] :], (count, len(elements), width)))
-    own = np.concatenate(result, axis=1)
-    Q = algebra.qr(np.concatenate([own, *rest], axis=1))[0]
-    n = own.shape[1]
+    stresses = np.concatenate(result, axis=1)
+    Q = algebra.qr(np.concatenate([stresses, *rest], axis=1))[0]
+    n = stresses.shape[1]
     _, missing, Vt = algebra.svd(algebra.qr(Q[:, n:])[1])
     null = np.ones(Vt.shape[:2], dtype=bool)
     null[:, : missing.shape[1]] = missing <= RANK
@@ -309,9 +309,9 @@ def find_reactions(
     parts = []
     for k in range(0, len(states.t), width):
         some = slice(k, k + width)
-        x, now, own = (np.ascontiguousarray(y[:, some]) for y in (states.x, a, multipliers))
+        x, now, multipliers_here = (np.ascontiguousarray(y[:, some]) for y in (states.x, a, multipliers))
         loads = {number: force[some] for number, force in drives.items()}
-        parts.append(_reactions(states._replace(t=states.t[some], x=x), now, own, loads))
+        parts.append(_reactions(states._replace(t=states.t[some], x=x), now, multipliers_here, loads))
     return np.concatenate([r for r, _ in parts], axis=-1), np.concatenate([m for _, m in parts], axis=-1)
 
 
@@ -337,9 +337,9 @@ def _reactions(
         if joint != GROUND:
             result[joint] -= multipliers[row] * on_successor(table, geometry, joint, geometry.rows[row])
     for joint in range(len(result)):
-        own = free_of(table, joint)
-        if own:
-            result[joint] -= along_free(geometry.free[own], result[joint])[1]
+        free = free_of(table, joint)
+        if free:
+            result[joint] -= along_free(geometry.free[free], result[joint])[1]
     if not module.n_rows and not table["cut"]:
         return result, np.zeros(result.shape, dtype=bool)
     return remove_self_stress(states, table, geometry, result, multipliers)

@@ -39,11 +39,11 @@ def random_states(module: BoundModel, random: np.random.Generator, count: int) -
         if len(states) == count:
             break
         try:
-            x, own = _on_constraints(module, random, rate)
+            x, rates = _on_constraints(module, random, rate)
         except EvaluationError:
             continue
         states.append(x)
-        accelerations.append(own)
+        accelerations.append(rates)
     if not states:
         raise ProjectionError(f"model {module.name!r}: no random state could be put on the constraints")
     x = np.array(states).T
@@ -57,8 +57,8 @@ def _on_constraints(module: BoundModel, random: np.random.Generator, rate: float
     q = scales.move(layout.q_reference, np.pi * random.uniform(-1.0, 1.0, module.n_v))
     x = module.project(np.concatenate([q, rate * scales.q * random.normal(size=module.n_v)]))
     free = free_motions(module.constraint_jacobian(x[:n_q], rows="all"), scales)
-    own = module.rhs(0.0, x)[n_q:]  # keeps the constraints, as does every change along what they leave free
-    return x, own + free @ (rate * rate * random.normal(size=free.shape[1]))
+    a = module.rhs(0.0, x)[n_q:]  # keeps the constraints, as does every change along what they leave free
+    return x, a + free @ (rate * rate * random.normal(size=free.shape[1]))
 
 
 def _rate(module: BoundModel) -> float:

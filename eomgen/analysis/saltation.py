@@ -360,9 +360,9 @@ class Strike:
         """Derivatives by [q, v, t, u, p] of M a + C_q^T l - n^T g, of a / s^2 + C_q^T l, of C_q v + C_t and of the
         events' rates."""
         n_v, n_c = self.layout.n_v, self.layout.n_c
-        held = np.zeros(self.layout.n_held // 2)
-        held[[*self.closed]] = l[n_c:]
-        every = self._slopes(self.t, np.concatenate([self.q, v, change, l[:n_c], g, held]))
+        switched = np.zeros(self.layout.n_held // 2)
+        switched[[*self.closed]] = l[n_c:]
+        every = self._slopes(self.t, np.concatenate([self.q, v, change, l[:n_c], g, switched]))
         ends = np.cumsum([n_v, n_v, n_c, self.layout.n_events])
         first, second, third, fourth, fifth = np.split(every, ends)
         return first, second, np.vstack([third, fifth[[*self.closed]]]), fourth
@@ -406,12 +406,12 @@ def after_impact(
     g[event] = algebra.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0]
     force = M @ change - n[0] * g[event]
     l = solve_multipliers(strike.C_q[None], force[:, None], strike.scales)[:, 0]
-    held = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))
+    resting = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))
     balance, _, rate, after = strike.rows(strike.v, change, l, g)
     before = strike.rows(v, change, l, g)[3]
     what = f"event {layout.info.events[event]['name']}"
-    gap = held.along(after[event : event + 1], what, names) + e * move.along(before[event : event + 1], what, names)
-    pushed, rates = held.along(balance, what, names), held.along(rate, what, names)
+    gap = resting.along(after[event : event + 1], what, names) + e * move.along(before[event : event + 1], what, names)
+    pushed, rates = resting.along(balance, what, names), resting.along(rate, what, names)
     return np.vstack([move.x[:n_q], strike.solve(M, move.x[n_q:], pushed, rates, n, gap)])
 
 
@@ -446,9 +446,9 @@ def after_reset(
     dq = dq - _back(run, module, strike, dq, move)
     star_v = star[n_q:]
     m = solve_multipliers(strike.C_q[None], ((strike.v - star_v) / scales.q**2)[:, None], scales)[:, 0]
-    held = run.move(t, x, np.vstack([dq, np.zeros_like(dv)]), move.t)
+    changed = run.move(t, x, np.vstack([dq, np.zeros_like(dv)]), move.t)
     _, least, rate, _ = strike.rows(strike.v, strike.v - star_v, m, np.zeros(layout.n_events))
-    pushed, rates = held.along(least, what, names), held.along(rate, what, names)
+    pushed, rates = changed.along(least, what, names), changed.along(rate, what, names)
     nothing = np.zeros((0, layout.n_v)), np.zeros((0, dv.shape[1]))
     return np.vstack([dq, strike.solve(np.diag(scales.q**-2), dv, pushed, rates, *nothing)])
 
@@ -669,22 +669,22 @@ class Saltation(Events):
         return x, self.run.consistent(t, x, S)
 
     # -- what has no derivative -----------------------------------------------------------------------------------
-    def _refuse_ends(self, t: float, own: int) -> None:
+    def _refuse_ends(self, t: float, index: int) -> None:
         near = SIMULTANEOUS * abs(self.span[1] - self.span[0])
         for end, what in ((self.span[0], "start"), (self.span[1], "end")):
             if abs(t - end) <= near:
-                raise self._at_an_end(t, self.names[own], what)
+                raise self._at_an_end(t, self.names[index], what)
         if any(abs(t - corner) <= near for corner in self.corners):
             raise NoDerivativeError(
-                f"event {self.names[own]} happens at t = {t:.6g} s, exactly where an input jumps or bends; the run "
+                f"event {self.names[index]} happens at t = {t:.6g} s, exactly where an input jumps or bends; the run "
                 "has no "
                 "derivative there"
             )
 
-    def _refuse_others(self, t: float, x: Array, own: int, f: Array) -> None:
+    def _refuse_others(self, t: float, x: Array, index: int, f: Array) -> None:
         """Refuse another event at the same instant that changes the state or ends the run."""
         for other, event in enumerate(self.every):
-            if other == own or event.direction == UNWATCHED or (event.action == GO_ON and not event.terminal):
+            if other == index or event.direction == UNWATCHED or (event.action == GO_ON and not event.terminal):
                 continue
             value = self._value(t, x, other)
             if np.isnan(value):
@@ -695,7 +695,7 @@ class Saltation(Events):
                 continue  # it has just happened, and leaves
             near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:
-                raise self._at_once(t, [self.names[own], self.names[other]])
+                raise self._at_once(t, [self.names[index], self.names[other]])
 
     def _refuse_contradictions(
         self, t: float, x: tuple[Array, Array], d: tuple[Array, Array], move: Move, index: int

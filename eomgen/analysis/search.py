@@ -91,19 +91,19 @@ class Search:
     """The equations of balance for one model, time and set of held coordinates, and the ways to solve them."""
 
     def __init__(
-        self, module: BoundModel, t: float, held: Mapping[str, float], unknowns: Sequence[str], s: Array
+        self, module: BoundModel, t: float, fixed: Mapping[str, float], unknowns: Sequence[str], s: Array
     ) -> None:
         layout = module.layout
         self.first = s  #: first-order states where the search begins
         self.scale = np.array(layout.scales.q)  #: (n_v,) of displacements; of states what they are about to change by
         self.moving = layout.n_v - len(s)
         self.scale[self.moving :] = np.maximum(1.0, np.abs(s))
-        self.module, self.layout, self.t, self.held, self.names = module, layout, t, held, tuple(unknowns)
+        self.module, self.layout, self.t, self.held, self.names = module, layout, t, fixed, tuple(unknowns)
         check_names("parameter or input", self.names, layout.p + layout.u)
         self.parameters = [layout.p.index(name) for name in self.names if name in layout.p]
         self.inputs = [layout.u.index(name) for name in self.names if name in layout.u]
         self.names = tuple(layout.p[k] for k in self.parameters) + tuple(layout.u[k] for k in self.inputs)
-        self.supported = bool(held) and not self.names
+        self.supported = bool(fixed) and not self.names
 
     def bound(self, values: Array) -> BoundModel:
         if not self.names:
@@ -131,7 +131,7 @@ class Search:
 
     def gradients(self, module: BoundModel, q: Array) -> Array:
         """Gradients (k, n_v) of the held coordinates by displacements, in their scales."""
-        rows = [held.gradient for held in self.rows_to_hold(module, q)]
+        rows = [row.gradient for row in self.rows_to_hold(module, q)]
         return np.array(rows).reshape(len(rows), self.layout.n_v)
 
     def start(self, q: Array) -> SearchPoint:
@@ -161,8 +161,8 @@ class Search:
             q = initial.system.close(q, self.held, restarts=0).q
         elif self.held:
             q = initial.system.with_values(q, self.held)
-        held = self.gradients(module, q) if self.supported else None
-        return SearchPoint(q, states, values, module, balance_forces(module, self.t, q, states, held, preferred))
+        fixed = self.gradients(module, q) if self.supported else None
+        return SearchPoint(q, states, values, module, balance_forces(module, self.t, q, states, fixed, preferred))
 
     def residual(self, here: Balance, like: Balance) -> Array:
         """What must vanish, at the independent velocities and surplus displacements of another place."""
@@ -183,13 +183,13 @@ class Search:
             return LinearizedResidual(
                 J, basis, np.zeros((0, J.shape[1])), sizes + np.abs(J).sum(axis=1), DIFFERENCES, flow
             )
-        held = self.gradients(point.module, point.q)
+        fixed = self.gradients(point.module, point.q)
         held_by = self._hold_slopes(point.module, here.x)
-        result = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
+        result = slopes(point.module, self.t, here.x, fixed, held_by, self.parameters, self.inputs)
         basis, inverse = _orthonormal(result.Z / s[:, None])
-        if len(held):  # only displacements that leave the held coordinates alone
-            split = algebra.svd(held * s @ basis)
-            free = split[2][len(held) :].T
+        if len(fixed):  # only displacements that leave the held coordinates alone
+            split = algebra.svd(fixed * s @ basis)
+            free = split[2][len(fixed) :].T
             basis, inverse = basis @ free, inverse @ free
         sizes = np.abs(point.unknowns)
         weights = np.maximum(sizes, LEAST_UNKNOWN * max(1.0, float(sizes.max(initial=0.0))))
@@ -211,18 +211,18 @@ class Search:
         mass = self.mass(point)
         spread = np.abs(algebra.inv(mass)) @ np.abs(mass)
         s = self.scale[here.velocities]
-        own = residual_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
+        residual = residual_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
         rows = spread @ (np.abs(J[:n]).sum(axis=1) * s) / s
-        return np.concatenate([rows + own, np.abs(J[n:]).sum(axis=1)])
+        return np.concatenate([rows + residual, np.abs(J[n:]).sum(axis=1)])
 
     def _hold_slopes(self, module: BoundModel, x: Array) -> Array:
         """Derivatives (k, n_p) of the held coordinates by the parameters, scaled; only cut joints have some."""
         layout = self.layout
-        held = self.rows_to_hold(module, x[: layout.n_q])
-        rows = np.zeros((len(held), layout.n_p))
+        fixed = self.rows_to_hold(module, x[: layout.n_q])
+        rows = np.zeros((len(fixed), layout.n_p))
         if layout.n_loop_coordinates and self.parameters:
             every = module.kernels.assembly_jacobian(x, t=self.t)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]
-            for k, row in enumerate(held):
+            for k, row in enumerate(fixed):
                 if row.name in layout.loops:
                     rows[k] = every[layout.loops.index(row.name)] / row.scale
         return rows
@@ -292,8 +292,8 @@ def newton(
         solver = Solver(search.linearize(point))
         residual = search.residual(point.here, point.here)
         change = solver.solve(residual)
-        shown = solver.shown(change)
-        size, longest = float(np.linalg.norm(shown)), search.longest(solver.linear.moved @ change)
+        readable = solver.shown(change)
+        size, longest = float(np.linalg.norm(readable)), search.longest(solver.linear.moved @ change)
         if not np.isfinite(size):
             return point, step, False
         arrived = solver.arrived(residual, change, search.rounded(point))
@@ -303,7 +303,7 @@ def newton(
             return point, step, False
         most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
         if before is not None:
-            apart = float(np.linalg.norm(before[1] - shown))
+            apart = float(np.linalg.norm(before[1] - readable))
             part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, TINY)
         part, retried = most if plain else min(most, part), False
         there, grown = None, None
@@ -315,7 +315,7 @@ def newton(
             left = solver.shown(solver.solve(search.residual(there.here, point.here)))
             if plain:
                 break
-            off = float(np.linalg.norm(left - (1.0 - part) * shown))
+            off = float(np.linalg.norm(left - (1.0 - part) * readable))
             wanted = 0.5 * size * part**2 / max(off, TINY)
             if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
                 if arrived:  # rounding: no correction gets smaller
@@ -329,7 +329,7 @@ def newton(
         if there is None:
             return point, step, arrived
         point, last = there, size
-        before = None if grown is None or plain else (shown, grown[0], grown[1])
+        before = None if grown is None or plain else (readable, grown[0], grown[1])
     return point, STEPS, False
 
 

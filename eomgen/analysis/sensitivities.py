@@ -191,7 +191,7 @@ class Sensitivities(Result):
 # smooth function of p.
 
 
-def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> Differentiated:
+def split_columns(layout: Layout, names: Sequence[str], fixed: Sequence[str]) -> Differentiated:
     """Sort names into parameters, inputs and held initial values."""
     names = read_names("names", names)
     parameters, inputs, initial = [], [], []
@@ -200,15 +200,15 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
             parameters.append((column, layout.p.index(name)))
         elif name in layout.u:
             inputs.append((column, layout.u.index(name)))
-        elif name in held:
+        elif name in fixed:
             initial.append((column, name))
         elif name in (*layout.x, *layout.loops, *layout.loop_rates):
-            which = f"{', '.join(held)} {'are' if len(held) > 1 else 'is'}" if held else "nothing is"
+            which = f"{', '.join(fixed)} {'are' if len(fixed) > 1 else 'is'}" if fixed else "nothing is"
             raise ill_placed(
                 f"{name} is not held at the start ({which}), so there is no derivative by it; name it in hold="
             )
         else:
-            raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))
+            raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *fixed))
     if not names:
         raise incomplete("name at least one parameter, input or initial value")
     if len(set(names)) != len(names):
@@ -245,7 +245,7 @@ def start_sensitivity(
     module: BoundModel,
     t: float,
     x: Array,
-    held: Sequence[str],
+    fixed: Sequence[str],
     columns: Differentiated,
     inputs: SlopesNow | None = None,
     slopes: Mapping[str, Array] = MappingProxyType({}),
@@ -260,7 +260,7 @@ def start_sensitivity(
     E = assembly_rows(module, t, x, inputs)
     other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
     initial = Initial(module.kernels, t)
-    wanted = {name: np.zeros(count) for name in held}
+    wanted = {name: np.zeros(count) for name in fixed}
     for name in slopes.keys() & wanted.keys():
         (wanted[name],) = columns.spread(slopes[name][None], np.zeros((1, layout.n_u)))
     for column, name in columns.initial:
@@ -270,14 +270,14 @@ def start_sensitivity(
     N = scales.rates(x[:n_q], np.eye(n_v))
     turns = _turns(layout, x[:n_q], wanted)
     places = {name: [int(np.flatnonzero(row)[0]) for row in initial.gradients(x[:n_q], name)]
-              for name in held if name in layout.q}  # fmt: skip
+              for name in fixed if name in layout.q}  # fmt: skip
 
     def solve(
         J: Array, off: Array, lines: slice, own: Mapping[str, list[int]], cut: Sequence[str], first: int
     ) -> Array:
         """The changes (n_v, k) for which all lines of an assembly's equations of one level stay 0."""
         rows, right = [*scales.jacobian(J[lines])], [*(-off[lines] / scales.c[: lines.stop - lines.start, None])]
-        for name in held:
+        for name in fixed:
             for k in own.get(name, ()):
                 rows.append(np.eye(n_v)[k])
                 right.append(turns.get(k, wanted[name]) / scales.q[k])
@@ -289,7 +289,7 @@ def start_sensitivity(
 
     m = n_h + n_c
     dq = scales.rates(x[:n_q], solve(E[:, :n_q] @ N, other, slice(0, n_h), places, layout.loops, m))
-    turns, rates = {}, {name: [layout.v.index(name)] for name in held if name in layout.v}
+    turns, rates = {}, {name: [layout.v.index(name)] for name in fixed if name in layout.v}
     other = other + E[:, :n_q] @ dq
     m += layout.n_loop_coordinates
     return np.vstack([dq, solve(E[:, n_q:n_x], other, slice(n_h, n_h + n_c), rates, layout.loop_rates, m)])
@@ -299,13 +299,13 @@ def _turns(layout: Layout, q: Array, wanted: Mapping[str, Array]) -> dict[int, A
     """Rotations (k,) that changes of held Euler parameters make, by the places of their angular velocities in v."""
     result: dict[int, Array] = {}
     for i, j in layout.quaternion_slots:
-        held = [k for k in range(4) if layout.q[i + k] in wanted]
-        changes = np.array([wanted[layout.q[i + k]] for k in held])
+        fixed = [k for k in range(4) if layout.q[i + k] in wanted]
+        changes = np.array([wanted[layout.q[i + k]] for k in fixed])
         if changes.any():
             assert layout.space is not None
             G = np.stack([layout.space.rates(q, e)[i : i + 4] for e in np.eye(layout.n_v)[j : j + 3]], axis=1)
             whole = np.zeros((4, changes.shape[1]))
-            whole[held] = changes  # of length 1, those not given are 0
+            whole[fixed] = changes  # of length 1, those not given are 0
             result |= dict(zip(range(j, j + 3), algebra.lstsq(G, whole, rcond=STATE), strict=True))
     return result
 
@@ -508,8 +508,8 @@ def sensitivities(
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
     supplied = {n: read_number(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
-    held = names_to_hold(here, start, x0, supplied) if hold is None else _checked(bound, hold)
-    columns = split_columns(layout, read_names("names", names), held)
+    fixed = names_to_hold(here, start, x0, supplied) if hold is None else _checked(bound, hold)
+    columns = split_columns(layout, read_names("names", names), fixed)
     run = Variational(bound, forcing, columns)
     chosen = longest_step(bound, method) | {name: value for name, value in options.items() if value is not None}
     settings = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **chosen})
@@ -522,7 +522,7 @@ def sensitivities(
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     follows = start_slopes(layout, bound.kernels.context.p) if initial is None or supplied is not None else {}
     follows = {} if hold is not None else {name: by_p for name, by_p in follows.items() if name not in (supplied or ())}
-    S0 = start_sensitivity(here, start, x0, held, columns, run.input_slopes(start, x0), follows)
+    S0 = start_sensitivity(here, start, x0, fixed, columns, run.input_slopes(start, x0), follows)
     width = layout.n_x * (1 + len(columns.names))
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     few = layout.n_x <= FEW or method == "Taylor"
@@ -536,7 +536,7 @@ def sensitivities(
             method = "DOP853" if method == "Taylor" else method  # whose steps are too long, and which SciPy lacks
             S = find_along(run, partial(simulated, method=method), every, S0, trajectory.t, settings)
         if S is not None:
-            return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held)
+            return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), fixed)
     solver = choose_solver(method, "sensitivities")
     if np.ndim(settings["atol"]):  # of each state, and of its derivatives alike
         settings["atol"] = np.concatenate([settings["atol"], np.repeat(settings["atol"], len(columns.names))])
@@ -571,7 +571,7 @@ def sensitivities(
         _require_same(trajectory, single)
     refuse_lost_branches(bound, forcing, trajectory, columns)
     S = np.array([run.consistent(float(t), trajectory.x[:, j], raw[..., j]) for j, t in enumerate(trajectory.t)])
-    return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), held, salts.found)
+    return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), fixed, salts.found)
 
 
 def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Array) -> None:

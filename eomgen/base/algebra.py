@@ -172,29 +172,29 @@ def parts(J: Array) -> list[list[Level]]:
     of_rows = np.split(columns, np.searchsorted(rows, np.arange(1, m)))
     order = np.argsort(columns, kind="stable")
     of_columns = np.split(rows[order], np.searchsorted(columns[order], np.arange(1, n)))
-    held, collected = [x.tolist() for x in of_rows], [x.tolist() for x in of_columns]
+    members, collected = [x.tolist() for x in of_rows], [x.tolist() for x in of_columns]
     open_columns, result = np.ones(n, dtype=bool), list[list[Level]]()
     for k in range(n):
         if not open_columns[k]:
             continue
-        levels = _levels(k, held, collected)
+        levels = _levels(k, members, collected)
         if len(levels) > 1:  # from the coordinate of fewest rows among those farthest away
             far = next(level for level in reversed(levels) if level[1])[1]
-            levels = _levels(min(far, key=lambda j: (len(collected[j]), j)), held, collected)
-        for _, own in levels:
-            open_columns[own] = False
+            levels = _levels(min(far, key=lambda j: (len(collected[j]), j)), members, collected)
+        for _, members_of in levels:
+            open_columns[members_of] = False
         result.append([Level(np.array(a, dtype=np.intp), np.array(b, dtype=np.intp)) for a, b in _joined(levels)])
     return result
 
 
-def _levels(start: int, held: Sequence[list[int]], result: Sequence[list[int]]) -> list[tuple[list[int], list[int]]]:
+def _levels(start: int, members: Sequence[list[int]], result: Sequence[list[int]]) -> list[tuple[list[int], list[int]]]:
     """Rows and new columns of each level, from one column."""
     level, seen, known, levels = [start], {start}, set[int](), []
     while level:
         rows = sorted({i for j in level for i in result[j]} - known)
         known.update(rows)
         levels.append((rows, level))
-        level = sorted({j for i in rows for j in held[i]} - seen)
+        level = sorted({j for i in rows for j in members[i]} - seen)
         seen.update(level)
     return levels
 

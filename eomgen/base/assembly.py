@@ -138,9 +138,9 @@ def close(
             if damping > MOST:
                 break
             continue
-        settled = size <= SETTLED and largest(e_trial) > 0.5 * size
+        converged = size <= SETTLED and largest(e_trial) > 0.5 * size
         q, e, J = trial, e_trial, J_trial
-        if settled:
+        if converged:
             break
         # quadratic convergence at the end needs the damping to vanish with the residual
         if damping:
@@ -390,19 +390,19 @@ class ConstraintSystem(NamedTuple):
             partial(self.measure, names), numbers, scales, [kinds.get(n) == "angle" for n in names], names
         )
 
-    def closure(self, held: Mapping[str, float]) -> ClosureSystem:
+    def closure(self, fixed: Mapping[str, float]) -> ClosureSystem:
         free = np.ones(len(self.scales.q))
-        free[self.scales.velocities(self.indices(held))] = 0.0
-        return ClosureSystem(self.position, self.scales, free, self.wanted(held))
+        free[self.scales.velocities(self.indices(fixed))] = 0.0
+        return ClosureSystem(self.position, self.scales, free, self.wanted(fixed))
 
     @np.errstate(all="ignore")
-    def close(self, guess: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Assembly:
+    def close(self, guess: Array, fixed: Mapping[str, float], restarts: int = RESTARTS) -> Assembly:
         """Close the loops.
 
         Parameters
         ----------
         guess : (n_q,) array
-        held : mapping of str to float
+        fixed : mapping of str to float
             Coordinates of the tree or of cut joints and their exact values.
         restarts : int
             Largest number of further starts, at fixed places around the guess.
@@ -412,7 +412,7 @@ class ConstraintSystem(NamedTuple):
         Assembly
             The first closed position found without flipped axes; from a good guess the nearest one.
         """
-        system, guess = self.closure(held), self.with_values(guess, held)
+        system, guess = self.closure(fixed), self.with_values(guess, fixed)
         best, least, flipped = guess, np.inf, False
         for attempt, start in enumerate(starts(guess, system.free, self.scales, restarts)):
             q, residual = close(system, start)
@@ -424,7 +424,7 @@ class ConstraintSystem(NamedTuple):
             else:
                 return Assembly(q, residual, attempt, largest(self.scales.distance(q, guess)))
 
-        moved = self.scales.velocities(self.indices(held))
+        moved = self.scales.velocities(self.indices(fixed))
         failure = AssemblyFailure(system, guess, moved, best, flipped, self.names, self.labels, restarts)
         raise AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])
 
@@ -469,7 +469,7 @@ def close_nearest(
     aim, cut = system.with_values(start, {**raw, **rough}), system.wanted(rough)
     # velocities that move coordinates of the tree; np.unique would load numpy.ma
     guessed = np.array(sorted({*scales.velocities(system.indices(rough)).tolist()}), dtype=np.intp)
-    free, held = system.closure(raw), system.closure({**raw, **rough})
+    free, guided = system.closure(raw), system.closure({**raw, **rough})
 
     def distances(q: Array) -> Array:
         """Scaled distances of a position from the guessed values."""
@@ -486,13 +486,13 @@ def close_nearest(
 
     best = attempt(aim, 0, free._replace(equations=cut) if cut else None)
     # other places of what is not guessed, then of all that may move, while the best position is farther than that
-    turned = islice(starts(aim, held.free, scales, TURNED), TURNED if held.free.any() else 0)
+    turned = islice(starts(aim, guided.free, scales, TURNED), TURNED if guided.free.any() else 0)
     shifted = islice(starts(aim, free.free, scales, 4 * SHIFTED), 1, SHIFTED + 1)
     places = chain(((place, MEASURED) for place in turned), ((place, BESIDE) for place in shifted))
     for count, (place, enough) in enumerate(places, 1):
         if best is not None and best.distance <= enough:
             break
-        result = attempt(place, count, held)
+        result = attempt(place, count, guided)
         if result is not None and (best is None or _nearer(result, best, free)):
             best = result
     return best and best._replace(distance=largest(distances(best.q)))
@@ -535,7 +535,7 @@ def assemble_velocity(
     C_t: Array,
     scales: Scales,
     guess: Array | None = None,
-    held: Sequence[int] | Indices = (),
+    fixed: Sequence[int] | Indices = (),
     equations: VelocityEquations | None = None,
     names: Sequence[str] = (),
     labels: Sequence[str] = (),
@@ -547,7 +547,7 @@ def assemble_velocity(
     """
     v = np.zeros(C_q.shape[1]) if guess is None else np.array(guess, dtype=float)
     free = np.ones(len(v), dtype=bool)
-    free[np.asarray(held, dtype=np.intp)] = False
+    free[np.asarray(fixed, dtype=np.intp)] = False
     J, base = scales.jacobian(C_q), C_t / scales.c
     if equations is not None:
         J = np.vstack([J, equations.y_q * scales.q / equations.scales[:, None]])
@@ -565,7 +565,7 @@ def assemble_velocity(
     else:
         return v
 
-    raw = {names[i] if names else f"v[{i}]": x[i] for i in held}
+    raw = {names[i] if names else f"v[{i}]": x[i] for i in fixed}
     row_scales, all_labels = scales.c, list(labels) or [f"C[{i}]" for i in range(len(C_t))]
     if equations is not None:
         values = equations.values[(slice(None), *k)]

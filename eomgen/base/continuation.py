@@ -221,12 +221,12 @@ class HeldPath:
     """
 
     def __init__(
-        self, system: ConstraintSystem, start: Array, held: Mapping[str, float], end: float | None = None
+        self, system: ConstraintSystem, start: Array, fixed: Mapping[str, float], end: float | None = None
     ) -> None:
         self.system, self.start, self.scales = system, start, system.scales
         self.end = system.t if end is None else end
-        self.held, target = system.indices(held), system.with_values(start, held)
-        closure = system.closure(held)
+        self.held, target = system.indices(fixed), system.with_values(start, fixed)
+        closure = system.closure(fixed)
         self.free, self.values = closure.free, target[self.held]
         self.way = (1.0 - self.free) * self.scales.distance(target, start)  # (n,) scaled
         self.equations = equations = closure.equations
@@ -266,12 +266,12 @@ class HeldPath:
         return np.asarray((sides[0] - sides[1]) / (2.0 * DRIFTED))
 
 
-def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], end: float | None = None) -> Array:
+def follow(system: ConstraintSystem, start: Array, fixed: Mapping[str, float], end: float | None = None) -> Array:
     """Move held values, and the time, from where they are to others; the rest follows.
 
     See :class:`HeldPath` for the parameters.  Returns the position (n_q,) at the end.
     """
-    path = HeldPath(system, start, held, end)
+    path = HeldPath(system, start, fixed, end)
     if not path.length <= LONGEST:
         raise AssemblyError(f"the path from the reference position is too long ({path.length:.3g} rad or lengths)")
     timed = path.end != system.t

@@ -239,14 +239,14 @@ def _status(path: Path) -> os.stat_result | None:
 
 def _take_over(descriptor: int, earlier: os.stat_result) -> None:
     """Owner and group of the earlier file if they may be given, then its mode."""
-    own = os.fstat(descriptor)
+    status = os.fstat(descriptor)
     mode = stat.S_IMODE(earlier.st_mode)
-    if (own.st_uid, own.st_gid) != (earlier.st_uid, earlier.st_gid):
+    if (status.st_uid, status.st_gid) != (earlier.st_uid, earlier.st_gid):
         try:
             os.fchown(descriptor, earlier.st_uid, earlier.st_gid)
         except OSError:
             mode &= 0o755  # rights of a group that is not the file's any more
-            if own.st_gid != earlier.st_gid:
+            if status.st_gid != earlier.st_gid:
                 mode &= 0o705
     with suppress(OSError):
         os.fchmod(descriptor, mode)

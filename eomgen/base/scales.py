@@ -125,9 +125,9 @@ def settle(names: Sequence[str], kinds: Sequence[str], values: Mapping[str, floa
         e = np.array([values.get(name, 0.0) for name in four])
         length = float(np.sqrt(e @ e))
         if not abs(length - 1.0) <= UNIT:
-            shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(four, e, strict=True))
+            listed = ", ".join(f"{name} = {x:.6g}" for name, x in zip(four, e, strict=True))
             raise AssemblyError(
-                f"the Euler parameters {shown} have length {length:.6g}, not 1 (those not given are 0): "
+                f"the Euler parameters {listed} have length {length:.6g}, not 1 (those not given are 0): "
                 f"give {four[0]} = cos(angle/2) and {four[1]} .. {four[3]} = axis * sin(angle/2)",
                 code="EG-CONTRADICTION",
             )

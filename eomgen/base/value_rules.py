@@ -281,8 +281,8 @@ def fault_of_inertia(
     if a < -max(DIGITS * size, computed):
         return f"has a negative principal moment {a * unit:.6g}", NEGATIVE
     if b > max(MOMENT * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
-        shown = ", ".join(f"{moment * unit:.6g}" for moment in (a, b, c))
-        return f"principal moments {shown}: one exceeds the sum of the others", EXCESS
+        listed = ", ".join(f"{moment * unit:.6g}" for moment in (a, b, c))
+        return f"principal moments {listed}: one exceeds the sum of the others", EXCESS
     return None
 
 
@@ -346,11 +346,11 @@ def judge_bodies(values: Any, bodies: Sequence[Sequence[Any]]) -> list[Flaw]:
     axes = list[Array | None]()
     for _, has_axis, count, _ in bodies:
         ends = np.cumsum([at, 1, 9, 3 * has_axis, 3 * count])
-        mass, tensor, axis, own = (numbers[a:b] for a, b in itertools.pairwise(ends.tolist()))
+        mass, tensor, axis, central = (numbers[a:b] for a, b in itertools.pairwise(ends.tolist()))
         masses.append(float(mass[0]))
         tensors.append(tensor.reshape(3, 3))
         axes.append(axis if len(axis) else None)
-        points.append([p for p in own.reshape(-1, 3) if np.isfinite(p).all()])
+        points.append([p for p in central.reshape(-1, 3) if np.isfinite(p).all()])
         at = int(ends[-1])
     known = [np.isfinite(tensor).all() for tensor in tensors]
     scales = inertia_scales(
@@ -390,8 +390,8 @@ def spread_normals(count: int = NORMALS) -> Array:
     """Unit vectors (3, count) spread over the sphere on a spiral, none of them along an axis."""
     k = np.arange(count) + 0.5
     z, turn = 1.0 - 2.0 * k / count, math.pi * (1.0 + math.sqrt(5.0)) * k
-    across = np.sqrt(1.0 - z * z)
-    return np.array([across * np.cos(turn), across * np.sin(turn), z])
+    radius = np.sqrt(1.0 - z * z)
+    return np.array([radius * np.cos(turn), radius * np.sin(turn), z])
 
 
 def judge_support(values: Any) -> list[Flaw]:

@@ -56,9 +56,9 @@ def equilibrium(
     unknown: Annotated[Texts, "NAME: Parameter or input to solve for; repeat it for more."] = (),
 ) -> None:
     """Find a static equilibrium from the initial position; --set NAME=VALUE of a coordinate changes the guess."""
-    held: dict[str, float | None] = dict.fromkeys(word for word in hold if "=" not in word)
-    held |= parse_settings(tuple(word for word in hold if "=" in word), "--hold", "theta=0.3")
-    work.show(t, work.module.equilibrium(work.position(), t, hold=held, unknowns=unknown))
+    fixed: dict[str, float | None] = dict.fromkeys(word for word in hold if "=" not in word)
+    fixed |= parse_settings(tuple(word for word in hold if "=" in word), "--hold", "theta=0.3")
+    work.show(t, work.module.equilibrium(work.position(), t, hold=fixed, unknowns=unknown))
 
 
 @verb()
@@ -78,8 +78,8 @@ def sensitivity(
     with stage("integrate"):
         result = work.module.sensitivities(names, end, work.initial)
     files = [] if out is None else [result.save(out)]
-    held = f"held at the start: {', '.join(result.held)}"
-    work.show(float(result.t[-1]), *result.tables, held, values=result.to_dict(), files=files)
+    fixed = f"held at the start: {', '.join(result.held)}"
+    work.show(float(result.t[-1]), *result.tables, fixed, values=result.to_dict(), files=files)
 
 
 @verb()

@@ -134,9 +134,9 @@ def _read(path: Path, module: Module) -> dict[str, list[float]]:
             except ValueError:
                 raise no_number(f"{path}:{number}: {name} must be a number, not {word!r}") from None
     for name, unit in heads:
-        if unit and unit != (own := module.layout.unit(name)):
+        if unit and unit != (declared := module.layout.unit(name)):
             raise UsageError(
-                f"--cases {path}: {name} is given in {unit}; give values in {own or '1'}, without a unit",
+                f"--cases {path}: {name} is given in {unit}; give values in {declared or '1'}, without a unit",
                 code="EG-UNIT",
             )
     return columns

@@ -109,9 +109,9 @@ class Span(NamedTuple):
     points: int | None
 
 
-def parse_spans(option: str, words: Sequence[str], form: str, example: str) -> list[Span]:
+def parse_spans(option: str, texts: Sequence[str], form: str, example: str) -> list[Span]:
     """Ranges ``NAME=LOW:HIGH``, with a count where the form has one; ``[:COUNT]`` may be left out; each name once."""
-    spans = [_parse_span(option, word, form, example) for word in words]
+    spans = [_parse_span(option, word, form, example) for word in texts]
     names = [span.name for span in spans]
     if len(set(names)) < len(names):
         raise at_odds(f"{option}: {', '.join(names)}: give each name once")
@@ -476,10 +476,10 @@ def verb(
         @functools.wraps(function)
         def call(**values: Any) -> Any:
             groups = {name: hint for name, hint in hints.items() if hint is Prepared or hasattr(hint, "SECTION")}
-            own = {name: values.pop(name) for name in hints.keys() - groups.keys() if name in values}  # first of all
+            chosen = {name: values.pop(name) for name in hints.keys() - groups.keys() if name in values}  # first of all
             for name, hint in groups.items():
-                own[name] = gather(Source, values).compile().bound() if hint is Prepared else gather(hint, values)
-            return function(**own)
+                chosen[name] = gather(Source, values).compile().bound() if hint is Prepared else gather(hint, values)
+            return function(**chosen)
 
         params: list[click.Parameter] = list(options_of(function, wanted))
         if source:

@@ -102,18 +102,18 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], file: Path, w
 
     from ..runtime.plotting import Curves, choose, draw_panel, height, refined, stack
 
-    led = trajectory.metadata.get("led", ())
-    own = wanted.plain
-    over = led[0] if own and led and not np.ptp(trajectory.t) else wanted.against
+    driven = trajectory.metadata.get("led", ())
+    default = wanted.plain
+    over = driven[0] if default and driven and not np.ptp(trajectory.t) else wanted.against
     names = wanted.columns
-    if own:
+    if default:
         names = tuple(n for n in (*trajectory.metadata["q_names"], *trajectory.metadata["loop_names"]) if n != over)
-    panels, across = choose(trajectory, names, over, None, wanted.plot_as)
-    paths = paths if own else []
+    panels, abscissa = choose(trajectory, names, over, None, wanted.plot_as)
+    paths = paths if default else []
     size = (8.2 + 4.4 * bool(paths), max(3.2, sum(map(height, panels)) + 0.9))
     figure = Figure(figsize=size, layout="constrained", dpi=120)
     grid = figure.add_gridspec(1, 2 if paths else 1, width_ratios=[1.6, 1.0] if paths else [1.0])
-    for ax in stack(figure, grid[0], panels, across):
+    for ax in stack(figure, grid[0], panels, abscissa):
         for singular in getattr(trajectory, "singular", ()):
             if over is None or over in singular.values:
                 ax.axvline(singular.t if over is None else singular.values[over], color="0.6", ls=":", lw=1)

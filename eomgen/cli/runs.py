@@ -258,9 +258,9 @@ def _tables_of_motion(motion: KinematicAnalysis) -> tuple[ResultTable, ResultTab
         rows.append(("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all"))
     units = [motion.units.get(n, n) for n in ("t", *names)]
     sizes = [float(np.nanmax(np.abs(motion[n]), initial=0.0)) for n in ("t", *names)]
-    shown = [without_noise([motion[n][k] for n in ("t", *names)], units, sizes) for k in picked]
+    rounded = [without_noise([motion[n][k] for n in ("t", *names)], units, sizes) for k in picked]
     title = f"kinematics over {', '.join(motion.led) if motion.led else 't'}: {len(motion)} points"
-    return ResultTable((), rows, title), ResultTable(header, shown, right=range(len(header)))
+    return ResultTable((), rows, title), ResultTable(header, rounded, right=range(len(header)))
 
 
 # -- view --------------------------------------------------------------------------------------------------------------

@@ -102,8 +102,8 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
 
 def _of_analyses(program: Program) -> frozenset[str]:
     """Names of the blocks that only kernels need which runs do without: those that a session leaves for later."""
-    late = {k.name for k in KERNELS if k.late}
-    first = [k.name for k in program.kernels if k.name not in late]
+    lazy = {k.name for k in KERNELS if k.late}
+    first = [k.name for k in program.kernels if k.name not in lazy]
     if "rhs" not in first:  # a module for analyses
         return frozenset()
     drivers = {k.name: k.blocks for k in program.drivers}

@@ -231,8 +231,8 @@ class PairLists:
             after = f"w + {place + MEETING}, w + {place}, w + {work}"
             return [*filled, f"pairs_{function.name}_meeting(w + {source}, {after});"]
         rates = self._rates[function.name]
-        along, room = f"w + {source}, w + {rates}, w + {place}", self.again.get(function.name)
-        slope = f"slope({along}, w + {work})" if room is None else f"again({along}, {room})"
+        along, capacity = f"w + {source}, w + {rates}, w + {place}", self.again.get(function.name)
+        slope = f"slope({along}, w + {work})" if capacity is None else f"again({along}, {capacity})"
         return [
             f"memset(w + {rates}, 0, {function.count} * sizeof *w);",
             *filled,

@@ -191,16 +191,16 @@ class EllipsoidRod(EllipsoidRound):
     def touch(self, view: View) -> Touch:
         graph = view.graph
         reach, R, place = seen_from(self, view)
-        along, *across = (vec.transpose_times(R, axis) for axis in vec.transpose(view.rotation(self.second)))
+        along, *lateral = (vec.transpose_times(R, axis) for axis in vec.transpose(view.rotation(self.second)))
         squares = [a * a for a in self.axes]
 
         def form(a: Vec3, b: Vec3) -> Expr:
             return sum((q * x * y for q, x, y in zip(squares, a, b, strict=True)), graph.zero)
 
-        r = vec.dot(across[0], place), vec.dot(across[1], place)
-        bxx, bxy, byy = form(across[0], across[0]), form(across[0], across[1]), form(across[1], across[1])
+        r = vec.dot(lateral[0], place), vec.dot(lateral[1], place)
+        bxx, bxy, byy = form(lateral[0], lateral[0]), form(lateral[0], lateral[1]), form(lateral[1], lateral[1])
         nx, ny, h = silhouette_normal(view, r, (bxx, bxy, byy))
-        n = vec.add(vec.scale(nx, across[0]), vec.scale(ny, across[1]))
+        n = vec.add(vec.scale(nx, lateral[0]), vec.scale(ny, lateral[1]))
         scaled = [x / q for x, q in zip(along, squares, strict=True)]
         in_least = -sum((x * p for x, p in zip(scaled, place, strict=True)), graph.zero)
         in_least = in_least / sum((x * y for x, y in zip(scaled, along, strict=True)), graph.zero)
@@ -248,17 +248,17 @@ class EllipsoidEllipsoid(Contact):
 
     def deepest(self, view: View) -> Expr:
         """Nothing where the steps did not come to a common normal, of slim ellipsoids that are deep in each other."""
-        n, (h1, h2), (own, other, reach) = self._met(view)
-        size, way = h1 + h2, vec.sub(reach, vec.add(vec.scale(1.0 / h1, own), vec.scale(1.0 / h2, other)))
+        n, (h1, h2), (near, other, reach) = self._met(view)
+        size, way = h1 + h2, vec.sub(reach, vec.add(vec.scale(1.0 / h1, near), vec.scale(1.0 / h2, other)))
         aside = vec.sub(way, vec.scale(vec.dot(n, way), n))
         common = view.graph.apply("le", vec.dot(aside, aside), ASIDE * size * size)
         most = unique_depth(self.axes[0], h1) + unique_depth(self.axes[1], h2)
         return unless_spheres(self.axes, where(common, most, 0.0))
 
     def touch(self, view: View) -> Touch:
-        n, (h1, h2), (own, _, reach) = self._met(view)
+        n, (h1, h2), (near, _, reach) = self._met(view)
         depth = h1 + h2 - vec.dot(n, reach)
-        first = vec.sub(vec.scale(1.0 / h1, own), vec.scale(0.5 * depth, n))
+        first = vec.sub(vec.scale(1.0 / h1, near), vec.scale(0.5 * depth, n))
         return n, depth, first, vec.sub(first, reach)
 
     def _met(self, view: View) -> tuple[Vec3, tuple[Expr, Expr], tuple[Vec3, Vec3, Vec3]]:
@@ -277,8 +277,8 @@ class EllipsoidEllipsoid(Contact):
             n = self._step(forms, reach, n)[0]
         x, y, z = n
         n = self._step(forms, reach, (settled(view, x), settled(view, y), settled(view, z)))[0]
-        own, other = (vec.times(B, n) for B in forms)
-        return n, (sqrt(vec.dot(n, own)), sqrt(vec.dot(n, other))), (own, other, reach)
+        near, other = (vec.times(B, n) for B in forms)
+        return n, (sqrt(vec.dot(n, near)), sqrt(vec.dot(n, other))), (near, other, reach)
 
     @staticmethod
     def _begin(forms: list[Mat3], reach: Vec3) -> Vec3:
@@ -310,11 +310,11 @@ class EllipsoidEllipsoid(Contact):
         bend = _outer(graph.one, n)
         gap = reach
         for B in forms:
-            own = vec.times(B, n)
-            h = sqrt(vec.dot(n, own))
-            gap = vec.sub(gap, vec.scale(1.0 / h, own))
+            first = vec.times(B, n)
+            h = sqrt(vec.dot(n, first))
+            gap = vec.sub(gap, vec.scale(1.0 / h, first))
             bend = _weighed(
-                graph.one, bend, graph.one, _weighed(1.0 / h, B, -1.0 / (h * h * h), _outer(graph.one, own))
+                graph.one, bend, graph.one, _weighed(1.0 / h, B, -1.0 / (h * h * h), _outer(graph.one, first))
             )
         rise = vec.dot(n, gap)
         aside = vec.sub(gap, vec.scale(rise, n))
@@ -371,14 +371,14 @@ class BlockEllipsoid(Contact):
         d = vec.sub(place, (x, y, z))
         best, gap = None, graph.zero
         for n in self._normals(view, turn, form, signs, d):
-            own = vec.dot(n, d) - sqrt(vec.dot(n, vec.times(form, n)))
+            distance = vec.dot(n, d) - sqrt(vec.dot(n, vec.times(form, n)))
             if best is None:
-                best, gap = n, own
+                best, gap = n, distance
                 continue
-            better = graph.apply("lt", gap, own)
+            better = graph.apply("lt", gap, distance)
             for s, k in zip(signs, n, strict=True):
                 better = graph.apply("and", better, graph.apply("le", 0.0, s * k))
-            gap = where(better, own, gap)
+            gap = where(better, distance, gap)
             a, b, c = (where(better, p, q) for p, q in zip(n, best, strict=True))
             best = (a, b, c)
         assert best is not None
@@ -414,9 +414,9 @@ class BlockEllipsoid(Contact):
         amount = self._amount(form, place, least)
         for points in self._points(form, place):
             points = [held(k, x) for k, x in enumerate(points)]
-            own = self._amount(form, place, points)
-            smaller = graph.apply("lt", own, amount)
-            amount = where(smaller, own, amount)
+            whole = self._amount(form, place, points)
+            smaller = graph.apply("lt", whole, amount)
+            amount = where(smaller, whole, amount)
             least = [where(smaller, x, y) for x, y in zip(points, least, strict=True)]
         x, y, z = (where(graph.apply("lt", k, 0.0), -1.0, 1.0) for k in least)
         return x, y, z

@@ -42,8 +42,8 @@ class HeightField(NamedTuple):
         return substitute(self.values, {self.x: x, self.y: y})
 
 
-def planted(height: Expr, graph: Graph, own: Callable[[Expr], Expr]) -> HeightField:
-    """A height field in the graph of a pair; ``own`` brings what does not depend on the place from that of a model."""
+def planted(height: Expr, graph: Graph, bring: Callable[[Expr], Expr]) -> HeightField:
+    """A height field in the graph of a pair; ``bring`` maps what does not depend on the place from that of a model."""
     source = height.graph
     x, y = (graph.symbol(name) for name in PLACES.values())
     places = {source.symbol(name).id: symbol for name, symbol in zip(PLACES.values(), (x, y), strict=True)}
@@ -54,7 +54,7 @@ def planted(height: Expr, graph: Graph, own: Callable[[Expr], Expr]) -> HeightFi
         if i in new:
             return new[i]
         if i not in kept:
-            kept[i] = own(Expr(source, i)).id
+            kept[i] = bring(Expr(source, i)).id
         return kept[i]
 
     for i in reachable(source, [height.id]):
@@ -145,13 +145,13 @@ class FieldContact(Contact):
         h, hx, hy, *_ = self.field.at(x, y)
         size = sqrt(1.0 + hx * hx + hy * hy)
         n = (-hx / size, -hy / size, 1.0 / size)
-        own = self._reach((-hx, -hy, graph.one), view)
-        e = vec.sub((x, y, h), vec.add(place, own))
+        radius = self._reach((-hx, -hy, graph.one), view)
+        e = vec.sub((x, y, h), vec.add(place, radius))
         depth = vec.dot(n, e)
         aside = vec.sub(e, vec.scale(depth, n))
         square = vec.dot(e, e)
         good = graph.apply("le", vec.dot(aside, aside), ASTRAY * square)  # NaN is not
-        return n, where(good, depth, -sqrt(where(good, 1.0, square))), own, reach, good, unique
+        return n, where(good, depth, -sqrt(where(good, 1.0, square))), radius, reach, good, unique
 
     def deepest(self, view: View) -> Expr:
         """Nothing where the start or a step lies in a hollow that is sharper than the shape."""
@@ -159,9 +159,9 @@ class FieldContact(Contact):
 
     def touch(self, view: View) -> Touch:
         R = view.rotation(self.first)
-        n, depth, own, reach, *_ = self._found(view)
+        n, depth, radius, reach, *_ = self._found(view)
         normal = vec.times(R, n)
-        second = vec.add(vec.times(R, own), vec.scale(0.5 * depth, normal))
+        second = vec.add(vec.times(R, radius), vec.scale(0.5 * depth, normal))
         return normal, depth, vec.add(reach, second), second
 
     def nearness(self, view: View) -> tuple[Vec3, Expr]:
@@ -173,10 +173,10 @@ class FieldContact(Contact):
         """
         graph = view.graph
         R = view.rotation(self.first)
-        n, depth, own, reach, good, _ = self._found(view)
+        n, depth, radius, reach, good, _ = self._found(view)
         _, _, place = seen_from(self, view)
         beneath = self.field.at(place[0], place[1])[0]
-        over = STEEP * (place[2] - beneath) - sqrt(vec.dot(own, own))
+        over = STEEP * (place[2] - beneath) - sqrt(vec.dot(radius, radius))
         gap = where(good, -depth, graph.apply("max", over, -ASTRAY * depth))
         gap = where(graph.apply("and", good, graph.apply("lt", depth, 0.0)), STEEP * gap, gap)
         turning = view.angular_velocity(self.first)

@@ -122,8 +122,8 @@ class ContactGroups(Force):
         """Rates of bristles from what all pieces add."""
         result: list[Expr] = []
         for k, start in enumerate(range(0, len(sums), self._slots)):
-            own = friction.holding(self.states[k * self._each : (k + 1) * self._each], None)
-            result += own.rates_of(sums[start : start + self._slots])
+            force = friction.holding(self.states[k * self._each : (k + 1) * self._each], None)
+            result += force.rates_of(sums[start : start + self._slots])
         return tuple(result)
 
     def _rates_apart(self) -> list[Expr]:
@@ -181,19 +181,19 @@ class ContactGroups(Force):
         """Features of both groups, by class, of those classes that meet something."""
         groups = [_features(group) for group in (self.first, self.second) if group]
         met = set[tuple[int, FeatureKind]]()
-        for g, own in enumerate(groups):
+        for g, members in enumerate(groups):
             for h, other in enumerate(groups):
                 if g != h or len(groups) == 1:
-                    pairs = [(a, b) for a in own for b in other if self._meet((a, b), own[a], other[b])]
+                    pairs = [(a, b) for a in members for b in other if self._meet((a, b), members[a], other[b])]
                     met |= {(g, a) for a, _ in pairs} | {(h, b) for _, b in pairs}
         return [{k: parts for k, parts in group.items() if (g, k) in met} for g, group in enumerate(groups)]
 
-    def _meet(self, kinds: tuple[FeatureKind, FeatureKind], own: list[_Part], other: list[_Part]) -> bool:
+    def _meet(self, kinds: tuple[FeatureKind, FeatureKind], members: list[_Part], other: list[_Part]) -> bool:
         """Whether parts of two classes meet, and act on each other."""
         hollow, meet = kinds[0].name, (kinds[0].name, kinds[1].name) in MEETINGS
         if not meet or hollow not in HOLLOWS:
             return meet
-        pairs = [(one.feature.sizes, two.feature.sizes[0]) for one in own for two in other]
+        pairs = [(one.feature.sizes, two.feature.sizes[0]) for one in members for two in other]
         never = all(never_reached(hollow, sizes, radius) for sizes, radius in pairs)
         return not never and not self.normal_law.elastic(other[0].feature.sizes[0].graph.one).is_zero
 
@@ -246,8 +246,8 @@ class ContactGroups(Force):
             data = _SharedData(len(operands), graph)
             self._made[part] = self._function(f"{part}{self.name}", bodies, data, bool(part)), data.values
         function, shared = self._made[part]
-        held = [graph.zero] * function.states if still else self._held(graph)  # the energy does not depend on states
-        return markers, function, [*operands, *shared, *held]
+        states = [graph.zero] * function.states if still else self._held(graph)  # the energy does not depend on states
+        return markers, function, [*operands, *shared, *states]
 
     def _held(self, graph: Graph) -> list[Expr]:
         """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""
@@ -270,23 +270,23 @@ class ContactGroups(Force):
             for j, (h, second) in enumerate(keys):
                 apart = g != h or len(groups) == 1
                 twice = first.name == second.name and i > j  # round beside round, once
-                own, other = groups[g][first], groups[h][second]
-                if apart and not twice and self._meet((first, second), own, other):
-                    sizes = len(own[0].feature.sizes), len(other[0].feature.sizes)
-                    height = own[0].shape.sizes[0] if first.name == FIELD else None
+                these, other = groups[g][first], groups[h][second]
+                if apart and not twice and self._meet((first, second), these, other):
+                    sizes = len(these[0].feature.sizes), len(other[0].feature.sizes)
+                    height = these[0].shape.sizes[0] if first.name == FIELD else None
                     kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
                     if self.on_bed:
-                        places = tuple(self._slots * x.column for x in own)
-                        kind = replace(kind, held=(places, (0,) * len(other)), lines=_lines(own))
+                        places = tuple(self._slots * x.column for x in these)
+                        kind = replace(kind, held=(places, (0,) * len(other)), lines=_lines(these))
                     elif self.states:
                         block = blocks[g, h, class_of(first.name, second.name), second.name]
-                        rows = tuple(self._slots * block.of_first(x.number, x.column) for x in own)
+                        rows = tuple(self._slots * block.of_first(x.number, x.column) for x in these)
                         columns = tuple(self._slots * block.places * x.column for x in other)
                         kind = replace(kind, held=(rows, columns))
                     kinds.append(kind)
-        held = [x.value for x in self._held(data.graph)]
-        numbers = (*(x.value for x in data.values), *held)
-        return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(held))
+        states = [x.value for x in self._held(data.graph)]
+        numbers = (*(x.value for x in data.values), *states)
+        return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(states))
 
 
 #: Kind of shape -> where its law ends.
@@ -511,8 +511,8 @@ def _refuse_pairs(e: Entry, first: Sequence[ContactShape], second: Sequence[Cont
             elif a in GROUNDS and b in GROUNDS and (second or a != b or _differ(first, a)):
                 message = f"two shapes {a} do not meet" if a == b else f"{a} and {b} do not meet"
                 e.fault("second" if second else "first", message, _ALLOWED)
-    for key, own, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
-        if "plate" in own and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
+    for key, this_kind, met in (("second", kinds[0], kinds[1]), ("first", kinds[1], kinds[0])):
+        if "plate" in this_kind and (wrong := [kind for kind in met if kind not in _UNDER_PLATES]):
             e.fault(key, f"{wrong[0]} and plate do not meet", f"plates meet {', '.join(_UNDER_PLATES)}")
             break
     for key, group, others in (("first", first, second or first), ("second", second, first)):

@@ -98,19 +98,19 @@ def _choose_edges(first: np.ndarray, second: np.ndarray, corners: tuple[int, int
     reach = b[0:3] - a[0:3]
     x, y = ((R[:, i] * reach).sum(axis=0) for i in range(2))
     (xx, xy), (yx, yy) = ([(R[:, i] * S[:, k]).sum(axis=0) for k in range(2)] for i in range(2))
-    own, own_normals = _points(first, 0), _points(first, 2)
+    points, axes = _points(first, 0), _points(first, 2)
     px, py = _points(second, 0).swapaxes(0, 1)
     nx, ny = _points(second, 2).swapaxes(0, 1)
     others = np.stack([x + xx * px + xy * py, y + yx * px + yy * py], axis=1)
     normals = np.stack([yy * nx - yx * ny, xx * ny - xy * nx], axis=1)
     (depths_a, deepest_b), (depths_b, deepest_a) = (
-        _overlaps(own_normals, own, others),
-        _overlaps(normals, others, own),
+        _overlaps(axes, points, others),
+        _overlaps(normals, others, points),
     )
     least_a, least_b = depths_a.argmin(axis=0), depths_b.argmin(axis=0)
     of_second = _at(depths_b, least_b) < _at(depths_a, least_a)
-    facing_a = (own_normals * _at(normals, least_b)[None]).sum(axis=1).argmin(axis=0)
-    facing_b = (normals * _at(own_normals, least_a)[None]).sum(axis=1).argmin(axis=0)
+    facing_a = (axes * _at(normals, least_b)[None]).sum(axis=1).argmin(axis=0)
+    facing_b = (normals * _at(axes, least_a)[None]).sum(axis=1).argmin(axis=0)
     edge_a, edge_b = np.where(of_second, facing_a, least_a), np.where(of_second, least_b, facing_b)
     rest_a, rest_b = (
         np.where(np.arange(n).reshape(-1, *([1] * edge.ndim)) == edge, np.inf, depths)

@@ -199,15 +199,15 @@ def pair_states(groups: Sequence[Sequence[ShapeParts]]) -> tuple[dict[tuple[int,
                 if first == second and g > h:  # met already
                     continue
                 columns = sum(shape.parts.get(second, 0) for shape in groups[h])
-                own = [k for k, shape in enumerate(groups[g]) if _meets(shape.kind, first, second)]
-                if not own or not columns:
+                members = [k for k, shape in enumerate(groups[g]) if _meets(shape.kind, first, second)]
+                if not members or not columns:
                     continue
                 once = first == second and g == h
-                count = sum(groups[g][k].parts[second] for k in own) if first == second else len(own)
+                count = sum(groups[g][k].parts[second] for k in members) if first == second else len(members)
                 places = places_of((first, second))
-                block = PairStates(start, columns, {shape: row for row, shape in enumerate(own)}, once, places)
+                block = PairStates(start, columns, {shape: row for row, shape in enumerate(members)}, once, places)
                 result[g, h, first, second] = block
-                start += places * (count * (count - 1) // 2 if once else len(own) * columns)
+                start += places * (count * (count - 1) // 2 if once else len(members) * columns)
     return result, start
 
 
@@ -222,8 +222,8 @@ def places_of(names: tuple[str, str]) -> int:
 
 
 def _meets(kind: str, first: str, second: str) -> bool:
-    own = SHAPES[kind].first if kind in SHAPES else ""
-    return (own, second) in MEETINGS and class_of(own, second) == first
+    feature = SHAPES[kind].first if kind in SHAPES else ""
+    return (feature, second) in MEETINGS and class_of(feature, second) == first
 
 
 # -- laws --------------------------------------------------------------------------------------------------------------
@@ -311,8 +311,8 @@ class PairLaw(NamedTuple):
         self, normal: NormalLaw, friction: DryFriction | None, states: tuple[Expr, ...], lateral: Vec3 | None
     ) -> tuple[DryFriction | None, NormalLaw]:
         """The laws of a place of contact with its states."""
-        held = None if friction is None else friction.holding(states[: self.axes], lateral)
-        return held, normal.holding(states[self.axes :])
+        force = None if friction is None else friction.holding(states[: self.axes], lateral)
+        return force, normal.holding(states[self.axes :])
 
     @property
     def each(self) -> int:
@@ -370,13 +370,13 @@ def pair_kind(
     raw = [tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)]
     out = vec.transpose(view.rotation(markers[names[0] == "half"]))[2] if law.planar else vec.zero(graph)
     exerted: list[list[Expr]] = []
-    held: list[Expr] = []
+    forces: list[Expr] = []
     rates: list[Expr] = []
     witnesses: list[Expr] = []
     touch: list[Expr] = []
     for witness in range(places_of(names)):
-        states = tuple(graph.symbol(f"s{len(held) + k}") for k in range(law.slots))
-        held += states
+        states = tuple(graph.symbol(f"s{len(forces) + k}") for k in range(law.slots))
+        forces += states
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
         sides = (law.name, *markers)
         laws = (*sides, push, dry)
@@ -386,8 +386,8 @@ def pair_kind(
         if flat and not on_cell:
             contact = AtHeight(*sides, contact.normal_law, contact.friction, contact, pair.height())
         if names[1] == "wheel" and not on_cell:
-            across = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2]
-            contact = SoilWheel(*sides, push, dry, contact, raw[1][0], raw[1][1], across)
+            normal_axis = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2]
+            contact = SoilWheel(*sides, push, dry, contact, raw[1][0], raw[1][1], normal_axis)
         exerted.append(_exerted(contact, view, lost))
         if states and (lost or names[0] in HOLLOWS):
             rates += [graph.zero] * law.slots
@@ -408,10 +408,10 @@ def pair_kind(
         witnesses += [*normal_of, depth, *vec.add(view.position(markers[0]), arm), *out, *rigid]
     results = [*(reduce(add, result) for result in zip(*exerted, strict=True)), *rates]
     symbols = [f"a{k}" for k in range(POSE + sizes[0])] + [f"b{k}" for k in range(POSE + sizes[1])]
-    symbols += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(held)))]
+    symbols += [*(f"l{k}" for k in range(len(places))), *(f"s{k}" for k in range(len(forces)))]
     seeds = {graph.symbol(name): graph.symbol(f"d_{name}") for name in symbols}
     counts = [len(result) for result in (results, results, touch, witnesses)]
-    meets = [graph.apply("lt", 0.0, contact.touch(view)[1])] if isinstance(contact, SharedEnergy) and not held else []
+    meets = [graph.apply("lt", 0.0, contact.touch(view)[1])] if isinstance(contact, SharedEnergy) and not forces else []
     every = pair.unsettled([*results, *jvp(results, seeds), *touch, *witnesses, *meets])
     starts = [0, *itertools.accumulate(counts)]
     results, slopes, touch, witnesses = (every[a:b] for a, b in itertools.pairwise(starts))
@@ -428,7 +428,7 @@ def pair_kind(
         tuple(ids[len(results) :]),
         tuple(seen),
         tuple(met),
-        states=len(held),
+        states=len(forces),
         thin=2 if names[0] in _THIN and names[1] in _POINTS else int(names[0] in ("edge", "arc")),
         calls=tuple(
             (name, graph.calls[name]) for name in sorted(graph.calls.keys() & {str(node[0]) for node in nodes})

@@ -97,9 +97,9 @@ class PairSum:
     """
 
     def __init__(
-        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], room: int, states: int = 0
+        self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], capacity: int, states: int = 0
     ):
-        self.bodies, self.room, self.states = bodies, room, states
+        self.bodies, self.room, self.states = bodies, capacity, states
         self.tables = [np.array(table, dtype=int) for table in tables]
         self.kinds = [(*kind[:9], *self._pairs(*kind[:2])) for kind in kinds]
         self.held = [(kind[9], *(np.array(rows) for rows in kind[10])) if states else None for kind in kinds]
@@ -144,7 +144,7 @@ class PairSum:
         list of ``MEETING`` numbers or arrays
         """
         both = _stacked([*raw, *accelerations])
-        data, own = both[: len(raw)], both[len(raw) :].reshape(self.bodies, MOTION, *both.shape[1:])
+        data, motions = both[: len(raw)], both[len(raw) :].reshape(self.bodies, MOTION, *both.shape[1:])
         placed = [self._place(table, data, None)[:2] for table in self.tables]
         least = np.full(data.shape[1:], NEVER, dtype=data.dtype)
         deepest = np.zeros((MEETING - 1, *data.shape[1:]), dtype=data.dtype)
@@ -155,9 +155,9 @@ class PairSum:
             if not len(i):
                 continue
             change_a, change_b = (
-                _changed(x, arm, own[t[:, 0]]) for x, arm, t in zip((a, b), (arm_a, arm_b), tables, strict=True)
+                _changed(x, arm, motions[t[:, 0]]) for x, arm, t in zip((a, b), (arm_a, arm_b), tables, strict=True)
             )
-            a, b, change_a, spin = a[i], b[j], change_a[i], own[tables[0][i, 0]][:, 3:6]
+            a, b, change_a, spin = a[i], b[j], change_a[i], motions[tables[0][i, 0]][:, 3:6]
             reach, speed, change = b[:, 0:3] - a[:, 0:3], b[:, 12:15] - a[:, 12:15], change_b[j] - change_a
             if planar:
                 upright = a[:, [5, 8, 11]]  # z of the first shape
@@ -179,7 +179,7 @@ class PairSum:
                 felt = (
                     change - across(spin, reach) - across(turning, across(turning, reach)) - 2.0 * across(turning, seen)
                 )
-                turned, spun = b[:, 15:18] - turning, own[tables[1][j, 0]][:, 3:6] - spin
+                turned, spun = b[:, 15:18] - turning, motions[tables[1][j, 0]][:, 3:6] - spin
                 rate, own_rate, change_of_rate = (np.sqrt(dot(x, x)) for x in (turned, turning, spun))
                 faster = radius * rate - dot(normal, seen)  # of points of the second shape, which turns in the first
                 gap, closing = np.where(near, -depth, gap), np.where(near, faster, closing)
@@ -395,10 +395,10 @@ def pairs_of_rows(first: Any, second: Any, same: bool) -> tuple[np.ndarray, np.n
     return i[keep], j[keep]
 
 
-def _changed(shapes: np.ndarray, arm: np.ndarray, own: np.ndarray) -> np.ndarray:
+def _changed(shapes: np.ndarray, arm: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Accelerations of the centres of shapes (n, 3, ...) from those of their bodies."""
     turning = shapes[:, 15:18]
-    return np.asarray(own[:, 0:3] + across(own[:, 3:6], arm) + across(turning, across(turning, arm)))
+    return np.asarray(motion[:, 0:3] + across(motion[:, 3:6], arm) + across(turning, across(turning, arm)))
 
 
 def _stacked(raw: Sequence[Any]) -> np.ndarray:

@@ -427,10 +427,10 @@ def _acts(function: PairFunction, moving: PairCall, item: int) -> bool:
     if item == 6 * function.bodies or any(poses <= k < first for k in moving.numbers):
         return True
     bodies = {k // POSE for k in moving.numbers if k < poses}
-    held = {k - first for k in moving.numbers if k >= first}
+    states = {k - first for k in moving.numbers if k >= first}
     if item < 6 * function.bodies:
         body = item // 6
-        return bool(bodies & {body, *function.touching[body]}) or any(body in function.holders[k] for k in held)
+        return bool(bodies & {body, *function.touching[body]}) or any(body in function.holders[k] for k in states)
     state = item - 6 * function.bodies - 1
     each = min(kind.states for kind in function.kinds)  # a pair that touches at several places has a multiple
-    return bool(bodies & function.holders[state]) or any(k // each == state // each for k in held)
+    return bool(bodies & function.holders[state]) or any(k // each == state // each for k in states)

@@ -111,13 +111,13 @@ class Contact(Force):
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         normal, depth, _, sliding, rate = self._motion(view)
-        own, sums = self.normal_law.rates(depth, rate), self.sums_of_rates(view)
+        of_normal, sums = self.normal_law.rates(depth, rate), self.sums_of_rates(view)
         if isinstance(self.friction, LuGre) and sums is not None:
-            return (*self.friction.rates_of(sums), *own)
+            return (*self.friction.rates_of(sums), *of_normal)
         if self.friction is None:
-            return own
+            return of_normal
         push = self.law_here(view).force(depth, rate)
-        return (*self.friction.rates_in_plane(self._slip(view, normal, depth, sliding, push)), *own)
+        return (*self.friction.rates_in_plane(self._slip(view, normal, depth, sliding, push)), *of_normal)
 
     def sums_of_rates(self, view: View) -> tuple[Expr, ...] | None:
         """What this place adds to sums from which the rates of its states follow; None of laws whose rates add up."""

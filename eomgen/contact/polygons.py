@@ -118,8 +118,8 @@ class PolygonPolygon(Contact):
 
     def touch(self, view: View) -> Touch:
         graph, R = view.graph, view.rotation(self.first)
-        place, normal, own, depth = self._parts(view)[0]
-        half = times(normal, where(own, -0.5 * depth, 0.5 * depth))
+        place, normal, radius, depth = self._parts(view)[0]
+        half = times(normal, where(radius, -0.5 * depth, 0.5 * depth))
         middle = vec.times(R, (*_plus(place, half), graph.zero))
         reach = vec.sub(view.position(self.second), view.position(self.first))
         out = vec.times(R, (*normal, graph.zero))
@@ -154,11 +154,11 @@ class PolygonPolygon(Contact):
         low = graph.apply("lt", dot(way, b.end), dot(way, a.start))
         high = graph.apply("lt", dot(way, a.end), dot(way, b.start))
         witnesses = []
-        for own, one, two in ((low, a.start, b.end), (high, a.end, b.start)):
-            place = _either(own, one, two)
-            normal = _either(own, times(normal_b, -graph.one), normal_a)
-            depth = where(own, dot(normal_b, minus(b.start, place)), dot(normal_a, minus(a.start, place)))
-            witnesses.append(_Witness(place, normal, own, depth))
+        for edge, one, two in ((low, a.start, b.end), (high, a.end, b.start)):
+            place = _either(edge, one, two)
+            normal = _either(edge, times(normal_b, -graph.one), normal_a)
+            depth = where(edge, dot(normal_b, minus(b.start, place)), dot(normal_a, minus(a.start, place)))
+            witnesses.append(_Witness(place, normal, edge, depth))
         beside = graph.apply("lt", dot(way, witnesses[0].place), dot(way, witnesses[1].place))
         deeper = graph.apply("lt", witnesses[0].depth, witnesses[1].depth)  # whether the second is
         main = deeper if self.witness else 1.0 - deeper
@@ -205,9 +205,9 @@ class PolygonPolygon(Contact):
         def turned(n: Point) -> Point:  # of an edge as placed
             return yy * n[0] - yx * n[1], xx * n[1] - xy * n[0]
 
-        own, other = _matter(self.edges), _matter(self.others)
+        matter, other = _matter(self.edges), _matter(self.others)
         nx, ny = other.edge.normal
-        a = own.edge
+        a = matter.edge
         b = _Edge(
             placed(other.edge.start), placed(other.edge.end), turned((nx, ny)), zy * nx - zx * ny, other.edge.bend
         )
@@ -223,7 +223,7 @@ class PolygonPolygon(Contact):
             depths = dot(two[1], minus(two[0], corners[0])), dot(one[1], minus(one[0], corners[1]))
             return _Witness(place, normal, of_second, where(of_second, *depths))
 
-        least = witness(flags[0], (a.start, a.normal), (b.start, b.normal), (own.corner, placed(other.corner)))
+        least = witness(flags[0], (a.start, a.normal), (b.start, b.normal), (matter.corner, placed(other.corner)))
         next_b = placed(other.next_start), turned(other.next_normal)
-        corners = own.next_corner, placed(other.next_corner)
-        return _Facing(a, b, least, witness(flags[1], (own.next_start, own.next_normal), next_b, corners))
+        corners = matter.next_corner, placed(other.next_corner)
+        return _Facing(a, b, least, witness(flags[1], (matter.next_start, matter.next_normal), next_b, corners))

@@ -285,10 +285,10 @@ class SurfaceRound(ProfilePiece):
             on = graph.apply("lt", 0.0, far)  # towards its other end the piece hands the circle over to the next
             share = where(on, graph.apply("min", 1.0, 2.0 * far / where(on, far + inwards, 1.0)), 0.0)
             next_share = graph.apply("min", 1.0, graph.apply("max", 0.0, 2.0 - 2.0 * beyond * short))
-            own, next_one = weight * share, (1.0 - weight) * next_share
-            known = graph.apply("lt", 0.0, own + next_one)
-            whole = where(known, own / where(known, own + next_one, 1.0), weight)
-            taken = where(graph.apply("lt", 0.0, radius), own, whole)  # at a corner both take off the whole together
+            here, next_one = weight * share, (1.0 - weight) * next_share
+            known = graph.apply("lt", 0.0, here + next_one)
+            whole = where(known, here / where(known, here + next_one, 1.0), weight)
+            taken = where(graph.apply("lt", 0.0, radius), here, whole)  # at a corner both take off the whole together
             less = less + taken * graph.apply("max", 0.0, self.radius - away)
         depth = self.touch(view)[1]
         meets = graph.apply("lt", 0.0, depth)
@@ -637,14 +637,14 @@ def sprocket_ring(
     turns = [(math.cos(2.0 * math.pi * k / teeth), math.sin(2.0 * math.pi * k / teeth)) for k in range(teeth)]
     step = (graph.constant(turns[1][0]), graph.constant(-turns[1][1]))
     low, low_end = (x, -y), (end[0], -end[1])
-    across = minus(end, _turned(low_end, (step[0], -step[1])))  # along the tip before the first flank
-    over, down, up = unit(across), (-s, -c), (s, -c)
+    tip_edge = minus(end, _turned(low_end, (step[0], -step[1])))  # along the tip before the first flank
+    over, down, up = unit(tip_edge), (-s, -c), (s, -c)
     width = SHARED * (teeth * pitch)
     tooth = [
         edge(end, times(down, flank), over, down, width, walls=True),
         arc((x, y), low, down, width),
         edge(low, times(up, flank), up, _turned(over, step), width, walls=True),
-        edge(low_end, _turned(across, step), up, _turned(down, step), width, walls=True),
+        edge(low_end, _turned(tip_edge, step), up, _turned(down, step), width, walls=True),
     ]
     line = [end, (x, y), (_pitch_radius(teeth, pitch) - seat, graph.zero), low, low_end]
     pieces: list[ProfilePart] = []

@@ -71,10 +71,10 @@ class CoreRound(Contact):
             normal, gap = self._beside_cuboid(place)
             normal = vec.times(R, normal)
         else:
-            axes, across = vec.transpose(R), reach
+            axes, lateral = vec.transpose(R), reach
             for half, along, x in zip(self.halves, axes, place, strict=False):
-                across = vec.sub(across, vec.scale(_within(x, half), along))
-            normal, gap = direction(across, axes[len(self.halves)])
+                lateral = vec.sub(lateral, vec.scale(_within(x, half), along))
+            normal, gap = direction(lateral, axes[len(self.halves)])
         depth = self.radii[0] + self.radii[1] - gap
         second = vec.scale(0.5 * depth - self.radii[1], normal)
         return normal, depth, vec.add(reach, second), second
@@ -186,9 +186,9 @@ class RodRod(Contact):
     radii: tuple[Expr, Expr]
 
     def touch(self, view: View) -> Touch:
-        a, b, s, t, across = self._nearest(view)
-        distance = sqrt(vec.dot(across, across))
-        normal: Vec3 = (across[0] / distance, across[1] / distance, across[2] / distance)
+        a, b, s, t, lateral = self._nearest(view)
+        distance = sqrt(vec.dot(lateral, lateral))
+        normal: Vec3 = (lateral[0] / distance, lateral[1] / distance, lateral[2] / distance)
         depth = self.radii[0] + self.radii[1] - distance
         first = vec.add(vec.scale(s, a), vec.scale(self.radii[0] - 0.5 * depth, normal))
         return normal, depth, first, vec.add(vec.scale(t, b), vec.scale(0.5 * depth - self.radii[1], normal))

@@ -408,8 +408,8 @@ def _width(edges: Sequence[Expr], corners: Sequence[tuple[Expr, Expr]]) -> Expr:
     widths: list[Expr] = []
     for k in range(0, len(edges), EDGE):
         px, py, nx, ny, _ = edges[k : k + EDGE]
-        across = [nx * (px - x) + ny * (py - y) for x, y in corners]
-        widths.append(greatest(across))
+        spread = [nx * (px - x) + ny * (py - y) for x, y in corners]
+        widths.append(greatest(spread))
     return _least(widths)
 
 

@@ -174,9 +174,9 @@ class SoilCell(Contact):
         speed = graph.apply("abs", result.sliding)
         build = result.sliding - speed * shear.shears[0] / shear.modulus
         root = beyond_zero(result.most / self._reference(), sqrt)
-        held = root * result.sliding - speed * shear.shears[1] / (GRIP * shear.modulus)
+        rate = root * result.sliding - speed * shear.shears[1] / (GRIP * shear.modulus)
         deeper = self._deeper(result.depth, result.rate)
-        return [result.met * build, result.quick * held, deeper, result.met, deeper * deeper]
+        return [result.met * build, result.quick * rate, deeper, result.met, deeper * deeper]
 
     def _deeper(self, depth: Expr, rate: Expr) -> Expr:
         """z_m' by what presses the cell."""
@@ -264,7 +264,7 @@ def bed_rates(states: Sequence[Expr], sums: Sequence[Expr], recovery: Expr) -> l
     for k in states[0].graph.marked(range(len(states) // each)):
         *rates, deeper, pressed, squares = sums[k * slots : (k + 1) * slots]
         free = pressed.graph.apply("max", 0.0, 1.0 - pressed) / recovery
-        own = states[k * each : k * each + each - 1]
-        result += [rate - free * state for rate, state in zip(rates, own, strict=True)]
+        shears = states[k * each : k * each + each - 1]
+        result += [rate - free * state for rate, state in zip(rates, shears, strict=True)]
         result.append(beyond_zero(deeper, partial(truediv, squares)))
     return result

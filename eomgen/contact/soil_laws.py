@@ -149,11 +149,11 @@ class SoilPressure(Record, NormalLaw):
     def holding(self, states: tuple[Expr, ...]) -> SoilPressure:
         return replace(self, deepest=states[0])
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> SoilPressure:
-        numbers = {name: own(getattr(self, name)) for name in _NUMBERS if getattr(self, name) is not None}
+    def mapped(self, change: Callable[[Expr], Expr]) -> SoilPressure:
+        numbers = {name: change(getattr(self, name)) for name in _NUMBERS if getattr(self, name) is not None}
 
         def both(pair: tuple[Expr, Expr] | None) -> tuple[Expr, Expr] | None:
-            return None if pair is None else (own(pair[0]), own(pair[1]))
+            return None if pair is None else (change(pair[0]), change(pair[1]))
 
         return replace(self, **numbers, unloading=both(self.unloading), peak=both(self.peak))
 
@@ -232,8 +232,8 @@ class SoilShear(DryFriction):
     def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> SoilShear:
         return replace(self, shears=states, lateral=lateral)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> SoilShear:
-        return SoilShear(own(self.cohesion), own(self.slope), own(self.modulus), own(self.recovery))
+    def mapped(self, change: Callable[[Expr], Expr]) -> SoilShear:
+        return SoilShear(change(self.cohesion), change(self.slope), change(self.modulus), change(self.recovery))
 
     def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
         speed = beyond_zero(vec.dot(slip.velocity, slip.velocity), sqrt)  # the root has no slope at rest

@@ -308,9 +308,9 @@ class ContactShapes(Field):
         on = _ON["on"].map(part.get("on"), visitor)
         return made if on is None else {**made, "on": on}
 
-    def part(self, words: Sequence[str]) -> Field | None:
+    def part(self, path: Sequence[str]) -> Field | None:
         keys = {key: field for fields in SHAPE_FIELDS.values() for key, field in fields.items()}
-        return next((keys[word] for word in reversed(words) if word in keys), None)
+        return next((keys[word] for word in reversed(path) if word in keys), None)
 
 
 #: Shapes of mechanisms in the plane; the others are shapes in space.

@@ -502,8 +502,8 @@ class ConstantVelocity(Joint):
         """From 4 e0 e1, 4 e0 e2 and 4 e0^2 with e = (cos q2/2 cos q1/2, cos q2/2 sin q1/2, sin q2/2, 0)."""
         scalar = 1.0 + rotation[0][0] + rotation[1][1] + rotation[2][2]
         about_x, about_y = rotation[2][1] - rotation[1][2], rotation[0][2] - rotation[2][0]
-        across = sqrt(scalar * scalar + about_x * about_x)
-        return [2.0 * atan2(about_x, scalar), 2.0 * atan2(about_y, across)]
+        sine = sqrt(scalar * scalar + about_x * about_x)
+        return [2.0 * atan2(about_x, scalar), 2.0 * atan2(about_y, sine)]
 
 
 # -- all axes ----------------------------------------------------------------------------------------------------------
@@ -595,14 +595,14 @@ class GuidePoint(Vector):
     def read(self, reader: Any, path: str, value: Any, *own: Any) -> Shape:
         """A point as expressions of parameters of the model and of coordinates of the joint, ``own``."""
         (names,), point = own, reader.vector(path, value, self.level)
-        shown = " and ".join(names)
+        listed = " and ".join(names)
         for name in sorted(symbols_of(point) - {*reader.names.of("parameter"), *names}):
             if name in reader.names.kinds:
                 message = f"the {reader.names.kinds[name]} {name!r} cannot be used here"
-                reader.fault(path, message, f"allowed are parameters and {shown}", "EG-REFERENCE")
+                reader.fault(path, message, f"allowed are parameters and {listed}", "EG-REFERENCE")
         if not symbols_of(point) & {*names} and not reader.faults.under(path):
-            remedy = f"use the joint's own {shown} in the expressions"
-            reader.fault(path, f"does not depend on {shown}", remedy, "EG-EXPRESSION")
+            remedy = f"use the joint's own {listed} in the expressions"
+            reader.fault(path, f"does not depend on {listed}", remedy, "EG-EXPRESSION")
         return Shape(point, tuple(reader.graph.symbol(name) for name in names))
 
     def absent(self, reader: Any) -> Shape:

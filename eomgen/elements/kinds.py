@@ -183,11 +183,11 @@ class Field:
         """Whether leaving a value out means the same."""
         return value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0)
 
-    def part(self, words: Sequence[str]) -> Field | None:
+    def part(self, path: Sequence[str]) -> Field | None:
         """The key of a scalar within it, behind these words; itself where it has no parts."""
         if not self.parts:
             return self
-        return next((self.parts[word] for word in reversed(words) if word in self.parts), None)
+        return next((self.parts[word] for word in reversed(path) if word in self.parts), None)
 
     def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
         """The dimension of a scalar in an entry of these values, None if it is not known.
@@ -558,12 +558,12 @@ class Factors(Rates):
         terms: list[Any] = []
         for name, factor in sorted(value.items(), key=lambda pair: str(pair[0])):
             result = reader.coordinate(f"{path}.{name}", name)
-            own = reader.expression(f"{path}.{name}", factor)
+            product = reader.expression(f"{path}.{name}", factor)
             if result is not None:
                 if any(result.name == other.name for other, _ in terms):
                     remedy = "name it once, with the sum of its factors"
                     reader.fault(f"{path}.{name}", f"{result.name!r} is named twice", remedy, "EG-CONFLICT")
-                terms.append((result, own))
+                terms.append((result, product))
         return terms
 
     def reference(self, value: Any, refer: Any) -> Any:
@@ -676,9 +676,9 @@ class Markers(Field):
     schema, defines = define("markers", _mapping(ref("placement"), propertyNames=ref("name")))
     parts = MARKER
 
-    def part(self, words: Sequence[str]) -> Field | None:
+    def part(self, path: Sequence[str]) -> Field | None:
         """A marker may be written as its position alone."""
-        return super().part(words) or MARKER["at"]
+        return super().part(path) or MARKER["at"]
 
     def reference(self, value: Any, refer: Any) -> Any:
         return refer.markers(value)
@@ -923,9 +923,9 @@ class BodyParts(Field):
         if not isinstance(part, Mapping):
             return part
         placed = {key: x for key, x in part.items() if key in MARKER}
-        words = {key: x for key, x in part.items() if key in self.words}
-        own = {k: visitor.vector(x) for k, x in part.items() if k not in words and k not in placed}
-        return {**words, **own, **visitor.placement(visitor.entry.name, placed)}
+        texts = {key: x for key, x in part.items() if key in self.words}
+        vectors = {k: visitor.vector(x) for k, x in part.items() if k not in texts and k not in placed}
+        return {**texts, **vectors, **visitor.placement(visitor.entry.name, placed)}
 
 
 POINT: Fields = {

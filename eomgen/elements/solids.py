@@ -116,8 +116,8 @@ class Cylinder(Solid):
 
     def gyration(self) -> Vec3:
         r, l = self.radius, self.length
-        across = r * r / 4.0 + l * l / 12.0
-        return (across, across, 0.5 * r * r)
+        lateral = r * r / 4.0 + l * l / 12.0
+        return (lateral, lateral, 0.5 * r * r)
 
 
 class Tube(Solid):
@@ -135,8 +135,8 @@ class Tube(Solid):
     def gyration(self) -> Vec3:
         a, b, l = self.outer_radius, self.inner_radius, self.length
         square = a * a + b * b
-        across = square / 4.0 + l * l / 12.0
-        return (across, across, 0.5 * square)
+        lateral = square / 4.0 + l * l / 12.0
+        return (lateral, lateral, 0.5 * square)
 
 
 class Rod(Solid):
@@ -150,8 +150,8 @@ class Rod(Solid):
         return self.length
 
     def gyration(self) -> tuple[Expr | float, ...]:
-        across = self.length * self.length / 12.0
-        return (across, across, 0.0)
+        lateral = self.length * self.length / 12.0
+        return (lateral, lateral, 0.0)
 
 
 class Cone(Solid):
@@ -166,8 +166,8 @@ class Cone(Solid):
 
     def gyration(self) -> Vec3:
         r, h = self.radius, self.length
-        across = 0.15 * r * r + 0.0375 * h * h
-        return (across, across, 0.3 * r * r)
+        lateral = 0.15 * r * r + 0.0375 * h * h
+        return (lateral, lateral, 0.3 * r * r)
 
     def centre(self) -> Expr:
         return 0.25 * self.length

@@ -289,9 +289,9 @@ def final(author: Author) -> Section:
     left, right = map(author.letter, "Mf") if one else (r"\mathbf{M}", r"\mathbf{f}")
     if one:
         pieces = [Sentence(f"${left} {author.symbol(eqs.acceleration_names[0])} = {right}$ with")]
-    shown = author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
-    pieces += shown
-    known = set() if isinstance(shown[0], Sentence) else {symbol for symbol, _ in needed(named, mass)}
+    formulas = author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
+    pieces += formulas
+    known = set() if isinstance(formulas[0], Sentence) else {symbol for symbol, _ in needed(named, mass)}
     pieces += author.formulas(right, force[0] if one else force, named, ("force", None), explained=known)
     return Section("Equations of motion", tuple(pieces))
 

@@ -143,14 +143,14 @@ def compare(author: Author, module: Any) -> Difference:
     """
     result: dict[str, Comparison] = {}
     equations = author.equations
-    shown = {(s.name, s.part) for s in author.printed if s.name} | {("mass_matrix", None), ("force", None)}
+    printed = {(s.name, s.part) for s in author.printed if s.name} | {("mass_matrix", None), ("force", None)}
     each = {row.name for row in equations.rows() if row.by_name}
-    others = sorted((key for key in shown if key[0] not in COMPARED), key=str)
+    others = sorted((key for key in printed if key[0] not in COMPARED), key=str)
     moves = bool(equations.mobility.n_dof)
     for case in random_states(module, STATES, at_values=True):
         values = state_values(module, case)
         wanted = Wanted(module, case)
-        for name, part in sorted(shown, key=str):
+        for name, part in sorted(printed, key=str):
             if name in COMPARED and (moves or name not in OF_FREEDOMS):
                 _note(result, name, _number(equations, name, None, values), *COMPARED[name](wanted))
             elif name == "poses" and part in module.body_names:
@@ -158,10 +158,10 @@ def compare(author: Author, module: Any) -> Difference:
                 _note(result, f"poses[{part}]", _number(equations, "poses", part, values), pose.ravel(), 1.0)
         keys = {f"{name}[{part}]" if name in each else name: (name, part) for name, part in others}
         for what, key in keys.items():
-            own, formed, named = equations.as_formed(*key)
-            _compare_formed(result, what, formed, named, own, values)
-        for what, expressions, own in author.formed:
-            _compare_formed(result, what, expressions, (), own, values)
+            numbers, formed, named = equations.as_formed(*key)
+            _compare_formed(result, what, formed, named, numbers, values)
+        for what, expressions, numbers in author.formed:
+            _compare_formed(result, what, expressions, (), numbers, values)
     return Difference({name: one.finding().worst for name, one in result.items()}, STATES)
 
 
@@ -232,6 +232,6 @@ def _compare_formed(
     _note(result, what, evaluate(*written, numbers), wanted, float(np.max(terms[np.isfinite(terms)], initial=0.0)))
 
 
-def _note(result: dict[str, Comparison], name: str, shown: Any, wanted: Any, size: float) -> None:
+def _note(result: dict[str, Comparison], name: str, printed: Any, wanted: Any, size: float) -> None:
     largest = max(float(np.abs(wanted).max(initial=0.0)), size, SMALLEST)
-    result.setdefault(name, Comparison(name)).add(0, shown - wanted, largest, largest)
+    result.setdefault(name, Comparison(name)).add(0, printed - wanted, largest, largest)

@@ -112,8 +112,8 @@ def bodies(author: Author) -> Section | None:
                 formulas.append(author.line(author.of(r"\mathbf{c}", body.name), centre))
             if any(x != 0 for x in rest[3:]):
                 inertia = sympy.Matrix(3, 3, rest[3:])
-                own = ("J", inertia[axis, axis]) if axis is not None else (r"\mathbf{J}", inertia)
-                formulas.append(author.line(author.of(own[0], body.name), own[1]))
+                inertia_term = ("J", inertia[axis, axis]) if axis is not None else (r"\mathbf{J}", inertia)
+                formulas.append(author.line(author.of(inertia_term[0], body.name), inertia_term[1]))
         if len(m.bodies) > MANY or not author.full:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:
@@ -213,8 +213,8 @@ def motion(author: Author) -> list[Section]:
     omega, alpha = (r"\boldsymbol{\omega}", r"\boldsymbol{\alpha}") if axis is None else (r"\omega", r"\alpha")
     plane = ""
     if axis is not None:
-        along, across = " and ".join(f"${'xyz'[k]}$" for k in within), f"${'xyz'[axis]}$"
-        plane = f" All bodies move in one plane: components along {along} of ground and turns about {across}."
+        along, normal = " and ".join(f"${'xyz'[k]}$" for k in within), f"${'xyz'[axis]}$"
+        plane = f" All bodies move in one plane: components along {along} of ground and turns about {normal}."
     place = r"\mathbf{r} + \mathbf{R} \mathbf{u}"
     position: list[Piece] = [
         Sentence(
@@ -494,15 +494,15 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
     ]
     lines: list[Piece] = []
     left_out = 0
-    for shown in author.printed:
+    for part in author.printed:
         try:
-            known = known_values(shown.named, numbers)
+            known = known_values(part.named, numbers)
             result = []
             here = {str(symbol): float(value) for symbol, value in known.items() if isinstance(symbol, sympy.Symbol)}
-            for symbol, expression in shown.named:
-                result.append(_line(author, author.symbol(str(symbol)), expression, shown.named, here, known, numbers))
-            entries = [entry for entry in shown.entries if entry[1].free_symbols]
-            result += [_line(author, left, x, shown.named, here, known, numbers) for left, x in entries]
+            for symbol, expression in part.named:
+                result.append(_line(author, author.symbol(str(symbol)), expression, part.named, here, known, numbers))
+            entries = [entry for entry in part.entries if entry[1].free_symbols]
+            result += [_line(author, left, x, part.named, here, known, numbers) for left, x in entries]
         except (TypeError, ValueError):  # reactions, variations and momenta have no number of their own
             continue
         space = max(0, MOST - len(lines))

@@ -133,8 +133,8 @@ def comment_text(text: str) -> str:
     The result is printable ASCII without a backslash and without ``*/``, ``/*`` and ``??``; other characters are shown
     as ``<U+00B5>``.  So C's trigraphs and joined lines change nothing in it, and no comment ends in it.
     """
-    shown = _OUTSIDE.sub(lambda c: f"<U+{ord(c[0]):04X}>", " ".join(text.split()))
-    return _PAIRS.sub(" ", shown)
+    plain = _OUTSIDE.sub(lambda c: f"<U+{ord(c[0]):04X}>", " ".join(text.split()))
+    return _PAIRS.sub(" ", plain)
 
 
 def comment_lines(text: str, margin: str) -> str:
@@ -156,15 +156,15 @@ def toml_text(text: str) -> str:
 
 def yaml_quoted(text: str) -> str:
     """A YAML string in double quotes, whose value is the text; what prints stays as it is."""
-    shown = (c if c.isprintable() and c not in '\\"\ufeff' else _number(c) for c in text)
-    return f'"{"".join(shown)}"'
+    escaped = (c if c.isprintable() and c not in '\\"\ufeff' else _number(c) for c in text)
+    return f'"{"".join(escaped)}"'
 
 
 def markdown_text(text: str) -> str:
     """Paragraphs of Markdown that show the text: no markup of it takes effect, nor HTML."""
     paragraphs = re.split(r"\n\s*\n", texts.visible(text).strip())
-    words = (" ".join(paragraph.split()) for paragraph in paragraphs)
-    return "\n\n".join(_MARKUP.sub(lambda c: f"&#{ord(c[0])};" if c[0] in "&<>" else f"\\{c[0]}", w) for w in words)
+    plain = (" ".join(paragraph.split()) for paragraph in paragraphs)
+    return "\n\n".join(_MARKUP.sub(lambda c: f"&#{ord(c[0])};" if c[0] in "&<>" else f"\\{c[0]}", w) for w in plain)
 
 
 def markdown_code(text: str) -> str:

@@ -349,16 +349,16 @@ class _MjcfReader:
             last = j == joints[-1]
             child = name if last else f"{name}.{self.names['joint'][j]}"
             still = j == joints[0] and m.body_weldid[m.body_parentid[k]] == 0
-            own = inertia if last else NOTHING
+            mass = inertia if last else NOTHING
             if still and _TYPES[m.jnt_type[j]] == "spherical" and (rotor := float(m.dof_armature[m.jnt_dofadr[j]])):
-                own = replace(own, tensor=own.tensor + rotor * np.eye(3))
+                mass = replace(mass, tensor=mass.tensor + rotor * np.eye(3))
                 robot.notes.append(
                     f"the armature of the ball joint {self.names['joint'][j]} is part of the inertia of its body"
                 )
             if last:
-                inertia = own
+                inertia = mass
             else:
-                robot.links[child] = RobotLink(child, place, own)
+                robot.links[child] = RobotLink(child, place, mass)
             joint = self._joint(j, parent, child, at if j == joints[0] else IDENTITY, still)
             robot.joints[joint.name] = joint
             parent = child

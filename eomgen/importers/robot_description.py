@@ -86,8 +86,8 @@ class Bodies:
         result: dict[str, Load] = {}
         for body in reversed(self.bodies.values()):  # children come after their parents
             inertia, before = body.inertia(), result.get(body.name, Load(0.0, 0.0))
-            own = float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
-            mine = result[body.name] = Load(before.mass + inertia.mass, max(before.reach, own))
+            arm = float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
+            mine = result[body.name] = Load(before.mass + inertia.mass, max(before.reach, arm))
             if body.joint is None or not body.joint.parent:
                 continue
             home, frame = self.home[body.joint.parent]
@@ -195,8 +195,8 @@ def _lock(robot: Robot, options: RobotOptions) -> None:
 def _check_ends(robot: Robot) -> None:
     """Note joints whose links do not exist, and links that two joints carry."""
     carrier: dict[str, RobotJoint] = {}
-    if "world" not in robot.links and (held := [j for j in robot.joints.values() if j.parent == "world"]):
-        robot.links["world"] = RobotLink("world", held[0].place)
+    if "world" not in robot.links and (fixed := [j for j in robot.joints.values() if j.parent == "world"]):
+        robot.links["world"] = RobotLink("world", fixed[0].place)
         robot.notes.append("the link 'world' is not in the file; it stands for the ground")
 
     def check(path: str, link: str, place: tuple[str, int]) -> None:
@@ -263,7 +263,7 @@ def _check_inertias(robot: Robot, lenient: bool) -> None:
         points.setdefault(joint.parent, []).append(joint.outer.position)
         points.setdefault(joint.child, []).append(joint.inner.position)
     inertias = [link.inertia for link in robot.links.values()]
-    longest = longest_within(own for name, own in points.items() if name in robot.links)
+    longest = longest_within(place for name, place in points.items() if name in robot.links)
     scales = inertia_scales([i.mass for i in inertias], [i.tensor for i in inertias], longest)
     for link, scale in zip(robot.links.values(), scales, strict=True):
         fault = fault_of_inertia(link.inertia.tensor, scale=scale)
@@ -279,9 +279,9 @@ def _has_no_lever(joint: RobotJoint, inertia: Inertia) -> bool:
         return False
     if joint.type == "prismatic":
         return inertia.mass == 0.0
-    own, axis = inertia.seen(joint.inner.inverse()), _unit(joint.axis)
-    across, arm = float(axis @ own.tensor @ axis), np.cross(axis, own.com)
-    return across + own.mass * float(arm @ arm) <= SINGULAR * float(own.tensor.trace() + own.mass * (own.com @ own.com))
+    J, axis = inertia.seen(joint.inner.inverse()), _unit(joint.axis)
+    moment, arm = float(axis @ J.tensor @ axis), np.cross(axis, J.com)
+    return moment + J.mass * float(arm @ arm) <= SINGULAR * float(J.tensor.trace() + J.mass * (J.com @ J.com))
 
 
 def _check_masses(robot: Robot, result: Bodies, check: str) -> None:

@@ -502,19 +502,19 @@ def _independent_rows(forms: Forms, constants: Sequence[str], functions: Sequenc
             break
     else:
         return list(range(len(motion))), False
-    h, own = len(configuration), list[int]()
+    h, fresh_rows = len(configuration), list[int]()
     for k, row in enumerate(matrix):
-        factors = algebra.lstsq(matrix[own].T, row, rcond=None) if own else np.empty(0)
-        size = np.linalg.norm(row - factors @ matrix[own])
+        factors = algebra.lstsq(matrix[fresh_rows].T, row, rcond=None) if fresh_rows else np.empty(0)
+        size = np.linalg.norm(row - factors @ matrix[fresh_rows])
         if size > SMALL * np.linalg.norm(row) and size > np.linalg.norm(rounding[k]):
-            own.append(k)
+            fresh_rows.append(k)
             continue
         largest = max(1.0, float(abs(right[k])), float(np.abs(factors).max(initial=0)))
-        if abs(right[k] - factors @ right[own]) > SMALL * largest:
+        if abs(right[k] - factors @ right[fresh_rows]) > SMALL * largest:
             which = f"configuration constraint {k + 1}" if k < h else f"velocity constraint {k - h + 1}"
             message = (
                 f"{which} contradicts the others: it has the same velocity terms as they have, but other "
                 "remaining terms"
             )
             raise ModelError([Problem("equations.constraints", message, f"check the {which}", code="EG-REDUNDANT")])
-    return [k - h for k in own if k >= h], own[:h] == [*range(h)]
+    return [k - h for k in fresh_rows if k >= h], fresh_rows[:h] == [*range(h)]

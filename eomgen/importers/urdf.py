@@ -220,9 +220,9 @@ class _UrdfReader:
             self.fault(element, path, f"{value:g} is too large", remedy, "EG-RANGE")
             return 0.0
         if not math.isfinite(value):
-            shown = text if len(text) <= 40 else text[:37] + "..."
+            beginning = text if len(text) <= 40 else text[:37] + "..."
             what = "not finite" if text.strip().lower() in _SPECIAL else "not a number"
-            self.fault(element, path, f"{shown!r} is {what}", "give a finite number", "EG-NUMBER")
+            self.fault(element, path, f"{beginning!r} is {what}", "give a finite number", "EG-NUMBER")
             return 0.0
         return value
 
@@ -314,8 +314,8 @@ class _UrdfReader:
             shape["radius"] = self.number(raw, "radius", where)
         else:
             return None
-        own = "" if material is None else _color(material) or self.colors.get(material.attributes.get("name", ""), "")
-        return self.placement(element.find("origin"), f"{path}.origin"), shape | ({"color": own} if own else {})
+        color = "" if material is None else _color(material) or self.colors.get(material.attributes.get("name", ""), "")
+        return self.placement(element.find("origin"), f"{path}.origin"), shape | ({"color": color} if color else {})
 
     def _check_scale(self, element: XmlElement, path: str, factors: list[float]) -> None:
         if not all(factors) and not any(problem.path == path for problem in self.robot.problems):
@@ -430,9 +430,9 @@ class _UrdfReader:
             self.fault(mimic, path, "names no joint", 'give <mimic joint="..."/>', "EG-MISSING")
             return
         factor, offset = self.number(mimic, "multiplier", path, 1.0), self.number(mimic, "offset", path, 0.0)
-        own, followed = Sum(((name, 1.0),)), Sum(((other, 1.0),))
+        follower, followed = Sum(((name, 1.0),)), Sum(((other, 1.0),))
         if self.options.mimic == "coupling":
             place = element.file, element.line
-            self.robot.ties.append(Tie(f"{name}_mimic", own, followed, (offset, factor), place, path))
+            self.robot.ties.append(Tie(f"{name}_mimic", follower, followed, (offset, factor), place, path))
         elif name not in self.options.lock:
             self.loose.append(f"{name} = {factor:g} {other} + {offset:g}")

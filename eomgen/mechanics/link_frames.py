@@ -200,11 +200,11 @@ def _cost(angle: float, H: np.ndarray, directions: _Directions) -> float:
     return cost
 
 
-def _entry(x: float, own: bool) -> float:
+def _entry(x: float, exact: bool) -> float:
     if abs(x) <= ROUNDED:
         return 0.0
     if abs(abs(x) - 1.0) <= ROUNDED:
-        return 0.0 if own and x > 0 else EXCHANGED
+        return 0.0 if exact and x > 0 else EXCHANGED
     return MULTIPLIED
 
 

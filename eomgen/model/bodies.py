@@ -48,7 +48,7 @@ def check_bodies(
     masses = [requirements.known([body.mass]) for body in bodies]
     tensors = [requirements.known(_entries(body)) for body in bodies]
     numbers = [_numbers_of(body, points) for body, points in zip(bodies, _points(bodies, joints), strict=True)]
-    values = [x for own in numbers for group in own for x in _known(requirements, group)]
+    values = [x for groups in numbers for group in groups for x in _known(requirements, group)]
     flaws = judge_bodies(values, [_described(*one, True) for one in zip(bodies, numbers, strict=True)])
     scales = inertia_scales(
         [0.0 if mass is None else mass[0] for mass in masses],
@@ -79,10 +79,10 @@ def check_bodies(
                     notes.append(f"{place}: {message}; it is used as given")
     if any(symbols_of(_entries(body)) for body in bodies if body.check == "error"):
         alike: dict[Any, tuple[Body, list[Sequence[Expr]]]] = {}  # of bodies that are alike the first stands for all
-        for body, own in zip(bodies, numbers, strict=True):
-            alike.setdefault((body.check, *(tuple(x.id for x in group) for group in own)), (body, own))
-        data = [_described(body, own, body.check == "error") for body, own in alike.values()]
-        requirements.keep("bodies", BODIES, [x for _, own in alike.values() for g in own for x in g], (data,))
+        for body, groups in zip(bodies, numbers, strict=True):
+            alike.setdefault((body.check, *(tuple(x.id for x in group) for group in groups)), (body, groups))
+        data = [_described(body, groups, body.check == "error") for body, groups in alike.values()]
+        requirements.keep("bodies", BODIES, [x for _, groups in alike.values() for g in groups for x in g], (data,))
     return tuple(negative), tuple(notes)
 
 
@@ -108,8 +108,8 @@ def _entries(body: Body) -> list[Expr]:
 def _points(bodies: Sequence[Body], joints: Sequence[JointSpec]) -> list[list[Vec3]]:
     """Centre of mass, joints and the point of the inertia of each body; the centre of no mass does not count."""
     points: list[list[Vec3]] = [[] if body.mass.is_zero else [body.com] for body in bodies]
-    for own, body in zip(points, bodies, strict=True):
-        own += [] if body.about is None else [body.about]
+    for masses, body in zip(points, bodies, strict=True):
+        masses += [] if body.about is None else [body.about]
     for spec in joints:
         for marker in (spec.predecessor, spec.successor):
             if marker.body != GROUND:
@@ -194,16 +194,16 @@ def _solid(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> M
     read = _mesh(reader, path, values, raw.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
     if read is None or faults.under(path):
         return None
-    own, sizes = read
+    solid, sizes = read
     if not subtract:
         shape = BodyShape(reader.bodies[name], kind, sizes, frame, str(values.get("file", "")))
         reader.drawn["solids", name].append(shape)
-    mass = raw["mass"] if "mass" in raw else raw[density] * own.mass
+    mass = raw["mass"] if "mass" in raw else raw[density] * solid.mass
     if subtract:
         mass = -mass
-    tensor = rotate_symmetric(frame.rotation, own.inertia)
+    tensor = rotate_symmetric(frame.rotation, solid.inertia)
     x, y, z = (vec.scale(mass, row) for row in tensor)
-    com = vec.add(frame.position, vec.times(frame.rotation, own.com))
+    com = vec.add(frame.position, vec.times(frame.rotation, solid.com))
     return MassProperties(mass, com, (x, y, z))
 
 
@@ -334,14 +334,14 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
     if "check_inertia" in values:
         check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
     parts = read_parts(reader, entry.name, path, values)
-    own = [key for key in OWN if key in values]
-    if "solids" in values and own:
-        for key in own:
+    keys = [key for key in OWN if key in values]
+    if "solids" in values and keys:
+        for key in keys:
             remedy = "leave it out, or add points"
             faults.add(f"{path}.{key}", "is given beside solids, which already determine it", remedy, "EG-CONFLICT")
-    elif "mass" not in values and (own or not ("solids" in values or "points" in values or faults.under(path))):
+    elif "mass" not in values and (keys or not ("solids" in values or "points" in values or faults.under(path))):
         faults.missing(f"{path}.mass", f"give {kinds.Scalar.says}, solids or points")
-    if "solids" in values or not own:
+    if "solids" in values or not keys:
         o = vec.zero(graph)
         whole = combine(graph, parts) if parts else MassProperties(graph.zero, o, (o, o, o))
         return Body(entry.name, whole.mass, whole.com, whole.inertia, check=check)
@@ -420,8 +420,8 @@ def _about(reader: Reader, path: str, about: Any) -> tuple[Vec3, Mat3 | None] | 
         label = about if about.startswith(f"{body}.") else f"{body}.{about}"
         marker = reader.markers.get(label)
         if marker is None:
-            own = [key.partition(".")[2] for key in reader.markers if key.startswith(f"{body}.")]
-            remedy = nearest(about, [*POINTS, *own], "allowed")
+            markers = [key.partition(".")[2] for key in reader.markers if key.startswith(f"{body}.")]
+            remedy = nearest(about, [*POINTS, *markers], "allowed")
             reader.fault(place, f"{body!r} has no marker {about!r}", remedy, "EG-NAME-UNKNOWN")
             return None
         return marker.frame.position, marker.frame.rotation

@@ -42,16 +42,16 @@ def with_locks(description: Description) -> Description:
 def _lock_of(entry: DescribedEntry) -> tuple[DescribedEntry | None, DescribedEntry | None]:
     """What of an entry remains a joint, and what is a constraint."""
     kind: Any = entry.values.get("type")
-    own = {key: value for key, value in entry.values.items() if key in SWITCHING}
-    if not own or not isinstance(kind, str) or kind not in JOINTS:
+    switching = {key: value for key, value in entry.values.items() if key in SWITCHING}
+    if not switching or not isinstance(kind, str) or kind not in JOINTS:
         return entry, None
     rest = {key: value for key, value in entry.values.items() if key not in SWITCHING}
     if kind == WELD:
-        held = {"axes": "xyz", "turning": "xyz", **{key: x for key, x in rest.items() if key != "type"}}
-        return None, replace(entry, values={"type": "hold", **held, **own})
+        lock = {"axes": "xyz", "turning": "xyz", **{key: x for key, x in rest.items() if key != "type"}}
+        return None, replace(entry, values={"type": "hold", **lock, **switching})
     if not JOINTS[kind].kind.coordinates:
         return entry, None
-    return replace(entry, values=rest), replace(entry, values={"type": "lock", "joint": entry.name, **own})
+    return replace(entry, values=rest), replace(entry, values={"type": "lock", "joint": entry.name, **switching})
 
 
 class Declared(Record):
@@ -107,11 +107,11 @@ def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[D
         for k, name in enumerate(names):
             parameter = k < count and joint.coordinates[k].kind == "parameter"
             reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
-        own = [e.name + velocity.suffix for velocity in joint.velocities if velocity.of is None]
+        rates = [e.name + velocity.suffix for velocity in joint.velocities if velocity.of is None]
         if "latex" in e.values and count and len(names) == count:
-            others = [f"{name}_dot" for name in names] + own
+            others = [f"{name}_dot" for name in names] + rates
             take_coordinates_latex(reader, f"{e.path}.latex", names, e.values["latex"], others)
-        for name in own:
+        for name in rates:
             reader.names.declare("velocity", name, e.path)
         if len(names) == count:
             result.append(Declared(e, joint, tuple(str(n) for n in names), named))
@@ -179,14 +179,14 @@ def declare_contacts(reader: Reader, entries: list[DescribedEntry]) -> None:
 def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -> None:
     """Note periodic profiles that jump where a turn ends, as far as the values of parameters tell."""
     for constraint in constraints:
-        for own in fields(constraint):
-            profile = getattr(constraint, own.name)
+        for field in fields(constraint):
+            profile = getattr(constraint, field.name)
             if (turn := profile.over_a_turn() if hasattr(profile, "over_a_turn") else None) is None:
                 continue
             laws, angle = turn
             where = " at the declared values" if symbols_of(laws) - {angle} else ""
             try:
-                requirements.judge(f"constraints.{constraint.name}.{own.name}", TURN, laws, (), [angle], where)
+                requirements.judge(f"constraints.{constraint.name}.{field.name}", TURN, laws, (), [angle], where)
             except ModelError:  # native code without a Python fallback
                 continue
 

@@ -105,7 +105,7 @@ def build(description: Description) -> Mechanism:
     declared, by_clock = declare_states(
         reader, sections["states"], given_values is not None or lagrangian_values is not None
     )
-    held, state_rates = element_states(reader, sections["forces"])
+    element_values, state_rates = element_states(reader, sections["forces"])
     switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
@@ -129,7 +129,7 @@ def build(description: Description) -> Mechanism:
     events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
     differentiated = list_differentiated(reader, lagrangian, raw, constraints, switched, events, outputs)
     inputs = add_rates(reader, inputs, differentiated)
-    moves = ("coordinate", "velocity", *(("state",) if declared or held or switching else ()))
+    moves = ("coordinate", "velocity", *(("state",) if declared or element_values or switching else ()))
     starts = _initial(reader, "initial", values.get("initial", {}), (*moves, "output"))
     moving = set(reader.names.of(*moves))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
@@ -169,7 +169,7 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
-        states=(*states, *held, *(switch.discrete_state for switch in switched)),
+        states=(*states, *element_values, *(switch.discrete_state for switch in switched)),
         clocks=clocks,
         events=events,
         quantities=dict(reader.quantities),

@@ -428,8 +428,8 @@ def build_switches(
         releases = _released(reader, entry, names)
         rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10))
         reader.requirements.positive(f"{path}.stabilisation", rate)
-        held = (state_of(str(entry.name)), reader.flag(f"{path}.closed", closed), rate)
-        result.append(Switched(made.get(str(entry.name)), *held, tuple(map(state_of, releases))))
+        state = (state_of(str(entry.name)), reader.flag(f"{path}.closed", closed), rate)
+        result.append(Switched(made.get(str(entry.name)), *state, tuple(map(state_of, releases))))
     return tuple(result)
 
 

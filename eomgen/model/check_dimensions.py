@@ -148,16 +148,16 @@ def with_units(reader: Reader, joints: tuple[JointSpec, ...], outputs: tuple[Out
     result = []
     for output in outputs:
         faulty = bool(list(check.faults(output.expression, None)))
-        own = check.known[output.expression.id].dimension
-        if not output.unit and own is not None and not faulty:
+        dimension = check.known[output.expression.id].dimension
+        if not output.unit and dimension is not None and not faulty:
             nodes = [reader.graph.nodes[i] for i in reachable(reader.graph, [output.expression.id])]
             sums = {node[0] for node in nodes} <= {"sym", "neg", "add", "sub"}
             symbols = {str(node[1]) for node in nodes if node[0] == "sym"}
             angle = sums and symbols <= angles
             if sums and symbols <= {f"{name}()" for name in ENERGIES}:
                 output = replace(output, unit="J")
-            elif angle or (own != NONE and own.times(SPIN, -1) != NONE):
-                output = replace(output, unit=si_text(own, "rad" if angle else ""))
+            elif angle or (dimension != NONE and dimension.times(SPIN, -1) != NONE):
+                output = replace(output, unit=si_text(dimension, "rad" if angle else ""))
         result.append(output)
     return tuple(result)
 
@@ -169,8 +169,8 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
         for entry in reader.description.sections[section]:
             if entry.path in units:
                 for order, suffix in enumerate(RATES if section == "inputs" else ("",)):
-                    own = units[entry.path].dimension.times(TIME, -order)
-                    result.setdefault(f"{entry.name}{suffix}", Known(own, True))
+                    dimension = units[entry.path].dimension.times(TIME, -order)
+                    result.setdefault(f"{entry.name}{suffix}", Known(dimension, True))
     for entry in reader.description.sections["states"]:
         if entry.path in units:
             for order, suffix in enumerate(RATES[:2]):
@@ -180,13 +180,13 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
         # the parameters of a curve or surface may be lengths, angles or anything else
         free = max((option.own for option in joint.joint.options.values()), default=0)
         for name, coordinate in list(zip(joint.coordinates, joint.joint.coordinates, strict=True))[free:]:
-            own = LENGTH if coordinate.kind == "length" else NONE
+            dimension = LENGTH if coordinate.kind == "length" else NONE
             for order, suffix in enumerate(RATES):
-                result[name + suffix] = Known(None if name in declared else own.times(TIME, -order))
+                result[name + suffix] = Known(None if name in declared else dimension.times(TIME, -order))
         for name, velocity in zip(joint.velocities, joint.joint.velocities, strict=True):
             if velocity.of is None:
-                own = SPEED if velocity.kind == "length" else SPIN
-                result |= {name: Known(own), f"{name}_dot": Known(own.times(TIME, -1))}
+                dimension = SPEED if velocity.kind == "length" else SPIN
+                result |= {name: Known(dimension), f"{name}_dot": Known(dimension.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
         result[name] = Known(quantity.dimension)
     result |= {
@@ -210,9 +210,9 @@ def _steps(path: str) -> list[Any]:
 def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tuple[Field | None, Mapping[str, Any]]:
     """The row of the field in which an expression stands, and the values of the entry, or of the law in it."""
     if entry is None:
-        own = {"lagrangian": LAGRANGIAN, "equations": EQUATIONS}.get(section)
-        key = steps[0] if own is None else steps[1] if len(steps) > 1 else ""
-        return (MODEL if own is None else own).get(key.partition("[")[0]), {}
+        section_field = {"lagrangian": LAGRANGIAN, "equations": EQUATIONS}.get(section)
+        key = steps[0] if section_field is None else steps[1] if len(steps) > 1 else ""
+        return (MODEL if section_field is None else section_field).get(key.partition("[")[0]), {}
     row, values = fields_of(section, entry.values).get(steps[0]), entry.values
     if isinstance(row, Law) and len(steps) > 1:
         values = values[steps[0]]
@@ -296,7 +296,7 @@ class _Check:
         used = [str(self.graph.nodes[i][1]) for i in nodes if self.graph.nodes[i][0] == "sym"]
         known = [(name, self.names[name]) for name in used if name in self.names]
         listed = ", ".join(
-            f"{name} in {si_text(own.dimension)}" for name, own in known if own.dimension not in (None, NONE)
+            f"{name} in {si_text(one.dimension)}" for name, one in known if one.dimension not in (None, NONE)
         )
         constant = any(self.graph.nodes[i][0] == "const" for i in nodes)
         advice = "; give a number that has a unit as a parameter" if constant else ""
@@ -317,7 +317,7 @@ class _Check:
         return Known(getattr(self, f"_{row.dimension}")(i, parts, operands), declared, number)
 
     def _alike(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
-        some = [(own.dimension, k) for own, k in zip(parts, operands, strict=True) if own.dimension is not None]
+        some = [(one.dimension, k) for one, k in zip(parts, operands, strict=True) if one.dimension is not None]
         if not some:
             return None
         for other, k in some[1:]:
@@ -342,9 +342,9 @@ class _Check:
     _sign: Any = staticmethod(lambda i, parts, operands: NONE)
 
     def _pure(self, i: int, parts: list[Known], operands: list[int]) -> Dimension | None:
-        for own, k in zip(parts, operands, strict=True):
-            if own.declared and own.dimension is not None and not own.dimension.alike(NONE):
-                message = f"{written(self.graph, i)} is taken of {named(own.dimension)}"
+        for one, k in zip(parts, operands, strict=True):
+            if one.declared and one.dimension is not None and not one.dimension.alike(NONE):
+                message = f"{written(self.graph, i)} is taken of {named(one.dimension)}"
                 remedy = "its argument must be an angle (rad) or a number without unit, such as a ratio of two lengths"
                 self.wrong[i] = message, self._remedy(reachable(self.graph, [k]), remedy)
         return NONE
@@ -352,8 +352,8 @@ class _Check:
     def _product(self, i: int, parts: list[Known], operands: list[int], power: float = 1) -> Dimension | None:
         a, b = parts
         first, second = (
-            NONE if own.number and other.declared and self._is_ratio(k) else own.dimension
-            for own, other, k in ((a, b, operands[0]), (b, a, operands[1]))
+            NONE if one.number and other.declared and self._is_ratio(k) else one.dimension
+            for one, other, k in ((a, b, operands[0]), (b, a, operands[1]))
         )
         return None if first is None or second is None else first.times(second, power)
 

@@ -115,13 +115,13 @@ class Renaming(Visitor):
 
     def __init__(
         self,
-        own: Component,
+        component: Component,
         prefix: str,
         values: Mapping[str, str],
         attached: Mapping[str, Attached],
         fault: Fault | None = None,
     ) -> None:
-        self.own, self.prefix, self.values, self.attached, self.fault = own, prefix, values, attached, fault
+        self.own, self.prefix, self.values, self.attached, self.fault = component, prefix, values, attached, fault
         self.markers: dict[str, tuple[str, Mapping[str, Any]]] = {}  #: name -> body and place of markers to add
 
     def word(self, name: str) -> str:
@@ -218,13 +218,13 @@ def read_instance_value(entry: DescribedEntry, raw: Any, path: str) -> tuple[Any
             raise Refused(f"{path}.{key}", f"no key {key!r}", nearest(str(key), VALUE_KEYS, "keys"), "EG-NAME-UNKNOWN")
     if raw.get("value") is None:
         raise Refused(path, f"{dict(raw)!r} has no value", "write {value: 500, unit: mm}, or a number", "EG-MISSING")
-    value, unit, own = raw["value"], raw.get("unit"), entry.values.get("unit")
+    value, unit, base = raw["value"], raw.get("unit"), entry.values.get("unit")
     try:
         if unit is not None and not isinstance(unit, str):
             raise UnitError(f"{unit!r} is not a unit", "write a unit as text, as in mm")
         read = read_unit(unit or "")
-        if unit is not None and isinstance(own, str) and own and read_unit(own).dimension != read.dimension:
-            raise UnitError(f"{unit!r} does not measure what {entry.name} is in: {own}", "give a unit like that")
+        if unit is not None and isinstance(base, str) and base and read_unit(base).dimension != read.dimension:
+            raise UnitError(f"{unit!r} does not measure what {entry.name} is in: {base}", "give a unit like that")
         if not is_constant(value) and read.size != 1.0:
             remedy = "leave the unit out: parameters are in SI units, so the expression is too"
             raise UnitError(f"{str(value)!r} is an expression, and {unit} is not an SI unit", remedy)
@@ -446,8 +446,8 @@ def _add_to_ground(target: Description, renaming: Renaming, entry: DescribedEntr
     for shape in shapes if isinstance(shapes, list) else ():
         home = _body_entry(target, renaming.attached[GROUND_NAME].body)
         if home is not None and isinstance(shape, Mapping):
-            own = {key: x for key, x in shape.items() if key in MARKER}
-            placed_shape = {**shape, **renaming.placed(GROUND_NAME, own)}
+            marker = {key: x for key, x in shape.items() if key in MARKER}
+            placed_shape = {**shape, **renaming.placed(GROUND_NAME, marker)}
             home.values["display"] = [*home.values.get("display", ()), placed_shape]
 
 
@@ -468,12 +468,12 @@ def _add_marker(target: Description, body: str, name: str, placed: Mapping[str, 
 def _add_starts(target: Description, component: Component, instance: Instance, renaming: Renaming) -> None:
     """Initial values and guesses; those of the model itself come after them, and before them in force."""
     for key, raw in (("initial", instance.initial), ("guess", instance.guess)):
-        own = component.description.values.get(key, {})
+        starts = component.description.values.get(key, {})
 
         def inside(name: Any) -> Any:
             return started(name, lambda plain: renaming.prefix + plain, renaming)
 
-        made = {inside(name): renaming.scalar(x) for name, x in (own.items() if isinstance(own, Mapping) else ())}
+        made = {inside(name): renaming.scalar(x) for name, x in (starts.items() if isinstance(starts, Mapping) else ())}
         made |= {inside(name): value for name, value in raw.items()}
         if made:
             kept = target.values.get(key)
@@ -497,9 +497,9 @@ def rounds_of(raw: Any, path: str) -> list[Round]:
         raise Refused(path, f"{raw!r} is not a mapping of variables to their values", _LISTS, "EG-TYPE")
     columns = {name: _values_of(name, values, f"{path}.{name}") for name, values in raw.items()}
     if len({len(values) for values in columns.values()}) > 1:
-        shown = ", ".join(f"{name} has {len(values)}" for name, values in columns.items())
+        lengths = ", ".join(f"{name} has {len(values)}" for name, values in columns.items())
         remedy = "all lists must have the same length: the variables take their values side by side"
-        raise Refused(path, f"lists of different lengths: {shown}", remedy, "EG-SHAPE")
+        raise Refused(path, f"lists of different lengths: {lengths}", remedy, "EG-SHAPE")
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
@@ -732,8 +732,8 @@ def component_of(description: Description, name: str, place: str, faults: Faults
         if check is not None and entry.name != GROUND_NAME:
             entry.values.setdefault("check_inertia", check)
     component = Component(name, place, description, tuple(map(str, _attachments_of(description.values))))
-    own = dict.fromkeys((*component.attachments, GROUND_NAME), Attached(GROUND_NAME, GROUND_NAME, {}))
-    known = Renaming(component, "", {}, own, partial(component.report, faults))
+    attached = dict.fromkeys((*component.attachments, GROUND_NAME), Attached(GROUND_NAME, GROUND_NAME, {}))
+    known = Renaming(component, "", {}, attached, partial(component.report, faults))
     for section, entries in description.sections.items():
         for entry in entries:
             visit_entry(section, entry, known)

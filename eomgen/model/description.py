@@ -222,14 +222,14 @@ class Faults:
         places = [(problem, *self.origin_of(problem.path)) for problem in problems]
         attached = [(o.place, problem.message) for problem, _, o in places if o is not None and not o.instance]
         result: dict[Any, tuple[Problem, list[str]]] = {}
-        for problem, own, origin in places:
+        for problem, path_of, origin in places:
             if origin is None:
                 result[problem] = (problem, [])
             elif not origin.instance:
-                path = origin.place + problem.path[len(own) :]
+                path = origin.place + problem.path[len(path_of) :]
                 result.setdefault((path, problem.message), (problem._replace(path=path), []))
             elif not any(_gives(origin, place) and problem.message.startswith(message) for place, message in attached):
-                path = origin.place + problem.path[len(own) :]
+                path = origin.place + problem.path[len(path_of) :]
                 alike = problem.message.replace(origin.prefix, "") if origin.prefix else problem.message
                 first = problem._replace(path=path)
                 result.setdefault((path, alike, *problem[3:]), (first, []))[1].append(origin.instance)
@@ -238,8 +238,8 @@ class Faults:
     def names_at(self, path: str, names: Iterable[str]) -> list[str]:
         """The names as an entry may write them: of one that an instance brought, those of its component."""
         origin = self.origin_of(path)[1]
-        own = "" if origin is None else origin.prefix
-        return [name.removeprefix(own) for name in names if name.startswith(own) or name in (GROUND_NAME, "t")]
+        prefix = "" if origin is None else origin.prefix
+        return [name.removeprefix(prefix) for name in names if name.startswith(prefix) or name in (GROUND_NAME, "t")]
 
     def origin_of(self, path: str) -> tuple[str, Origin | None]:
         """The part of a path that an instance brought, and where that comes from."""
@@ -272,8 +272,8 @@ _LISTED = re.compile(r"(?<=: )(?:[\w.]+, ){3,}[\w.]+")
 
 
 def _in_instances(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:3])
-    return f" (in {shown} and {len(names) - 3} more)" if len(names) > 3 else f" (in {shown})"
+    listed = ", ".join(names[:3])
+    return f" (in {listed} and {len(names) - 3} more)" if len(names) > 3 else f" (in {listed})"
 
 
 def text_of(value: Any) -> str:

@@ -273,9 +273,9 @@ def declare_equations(reader: Reader, raw: Any, has_others: bool) -> dict[str, A
     for k, name in enumerate(q):  # the rate of one that no velocity is follows from the velocities
         kind = "coordinate" if f"{name}_dot" in v else "parameter of rotation"
         reader.names.declare(kind, name, f"{PATH}.coordinates[{k}]")
-    own = {f"{name}_dot" for name in q}
+    rates = {f"{name}_dot" for name in q}
     for k, name in enumerate(v):
-        if name not in own:
+        if name not in rates:
             reader.names.declare("velocity", name, f"{PATH}.velocities[{k}]")
     for k, name in enumerate(values["multipliers"]):
         reader.names.declare("multiplier", name, f"{PATH}.multipliers[{k}]")
@@ -369,13 +369,13 @@ def _rates(reader: Reader, raw: Any, q: Sequence[str], v: Sequence[str], local: 
         if name not in q:
             reader.unknown(f"{path}.{name}", "coordinate", name, q, "coordinates")
     result = []
-    own = {f"{name}_dot" for name in q} - set(v)
+    rates = {f"{name}_dot" for name in q} - set(v)
     for name in q:
         value: Any = named.get(name, f"{name}_dot" if f"{name}_dot" in v else None)
         if value is None:
             faults.add(path, f"{name!r} has no rate", f"give the rate of {name!r}", "EG-MISSING")
         rate = reader.stand_in if value is None else reader.expression(f"{path}.{name}", value, MOTION, local)
-        if not symbols_of([rate]).isdisjoint(own):
+        if not symbols_of([rate]).isdisjoint(rates):
             faults.add(
                 f"{path}.{name}", "depends on rates of coordinates", f"write it in {', '.join(v)}", "EG-EXPRESSION"
             )
@@ -465,10 +465,10 @@ def add_rates(reader: Reader, inputs: tuple[Input, ...], differentiated: Sequenc
         for name in sorted(symbols_of(expressions) & {u.name for u in inputs}):
             for k in range(1, times + 1):
                 needed.setdefault(rate_of(name, k), f"input {name!r}, whose rate {why} needs")
-    own = {u.name for u in inputs}
+    names = {u.name for u in inputs}
     added = []
     for rate, why in needed.items():
-        if rate in own:
+        if rate in names:
             continue
         base = next(u for u in inputs if split_rate(u.name)[0] == split_rate(rate)[0])
         kind = reader.names.kinds.get(rate)
@@ -510,8 +510,8 @@ def list_differentiated(
         result += [(positions, 2, "a constraint", section), (velocities, 1, "a constraint of velocities", section)]
     if raw is not None and lagrangian is None:
         seconds = {f"{name}_ddot" for name in raw.coordinates}
-        shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
-        if positions or shown:
+        in_outputs = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
+        if positions or in_outputs:
             result.append((list(raw.rates), 1, "q'' of the given rates", "equations.rates"))
     for_a_time = [switch.constraint for switch in switched if switch.constraint is not None]
     for c in (*constraints, *for_a_time):

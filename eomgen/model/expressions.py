@@ -283,8 +283,8 @@ class _Walker:
             what = "of a marker " if name in QUANTITIES else ""
             remedy = "use it in outputs, events and the laws of force elements"
             raise self.fault(node, f"{name}(...) {what}cannot be used here", remedy)
-        words = {word: key for key, word in _KEYWORDS.items()}
-        raw = {words.get(x.arg or "**", x.arg or "**"): _label(x.value) for x in node.keywords}
+        keywords = {word: key for key, word in _KEYWORDS.items()}
+        raw = {keywords.get(x.arg or "**", x.arg or "**"): _label(x.value) for x in node.keywords}
         try:
             if len(raw) < len(node.keywords):
                 raise ExpressionError(f"{name}() is given a keyword twice", 0, "leave one out")

@@ -379,8 +379,8 @@ def model_schema() -> dict[str, Any]:
     plain = {"initial": values, "guess": values, **{key: table_schema(fields) for key, fields in tables.items()}}
     sections |= {key: {**schema, "description": MODEL[key].doc} for key, schema in plain.items()}
     sections["bodies"]["properties"] = {"ground": table_schema(GROUND)}
-    own = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in COMPONENT.items()}
-    sections["components"] = _section(object_schema(own), MODEL["components"].doc)
+    keys = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in COMPONENT.items()}
+    sections["components"] = _section(object_schema(keys), MODEL["components"].doc)
     properties = {key: sections[key] if isinstance(field, Table) else field.json() for key, field in MODEL.items()}
     properties["independent"]["items"] = ref("reference")
     return {

@@ -117,8 +117,8 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
 def listing(known: Iterable[str], most: int = LISTED) -> str:
     """The first names joined by commas, and how many there are; ``"none"`` if there are none."""
     names = list(known)
-    shown = ", ".join(names[:most])
-    return (shown + f", ... ({len(names)} in all)" if len(names) > most else shown) or "none"
+    listed = ", ".join(names[:most])
+    return (listed + f", ... ({len(names)} in all)" if len(names) > most else listed) or "none"
 
 
 def nearest(name: str, known: Iterable[str], what: str = "known", more: Iterable[str] = ()) -> str:
@@ -200,8 +200,8 @@ class Namespace:
                 self.places[n] = path
         if clash is not None:
             other = f"{self.kinds[clash]} at {self.places[clash]}"
-            own = "" if clash == name else f", and {clash!r} is the rate of {name!r}"
-            message = f"the name {clash!r} is already used by the {other}{own}"
+            reason = "" if clash == name else f", and {clash!r} is the rate of {name!r}"
+            message = f"the name {clash!r} is already used by the {other}{reason}"
             remedy = "parameters, inputs, functions, coordinates, states, outputs and events share one namespace, with "
             self.faults.add(path, message, f"{remedy}the _dot and _ddot of coordinates; rename one", "EG-NAME-TAKEN")
             return False

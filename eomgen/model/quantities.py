@@ -262,8 +262,8 @@ class Named(NamedTuple):
 
     def __str__(self) -> str:
         seen = self.origin and self.name not in PAIRS
-        words = (("from", self.origin if seen else ""), ("on", self.on), ("in", self.axes))
-        named = "".join(f", {word}={label}" if label else "" for word, label in words)
+        parts = (("from", self.origin if seen else ""), ("on", self.on), ("in", self.axes))
+        named = "".join(f", {word}={label}" if label else "" for word, label in parts)
         first = f"{self.origin}, " if self.origin and not seen else ""
         return f"{self.name}({first}{self.of}{named}){f'.{self.part}' if self.part else ''}"
 

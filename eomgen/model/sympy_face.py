@@ -260,14 +260,14 @@ class SympyNames:
 
     def latex(self, raw: Any = None) -> Any:
         """The LaTeX of names: as it is given, else what the names were in SymPy where that is LaTeX."""
-        own: dict[str, str] = {}
+        letters: dict[str, str] = {}
         for old, new in self.renamed.items():
             text = "".join(f"\\{_SPELLED[c]} " if c in _SPELLED else c for c in normalize("NFKC", old)).strip()
             with suppress(NotationError):
                 if text.startswith("\\"):
                     read_latex(text)
-                    own[new] = text
-        return own | self.put(dict(raw or {})) if own else self.put(raw)
+                    letters[new] = text
+        return letters | self.put(dict(raw or {})) if letters else self.put(raw)
 
     def noted(self, description: Description) -> Description:
         """The description with a note of what was renamed."""

@@ -83,8 +83,8 @@ def read_unit(text: str) -> Unit:
         return Unit(dimensions.NONE, 1.0, "")
     dimension, size, only_si = dimensions.NONE, 1.0, True
     for word, power in _factors(text):
-        own, factor, is_si = (SI[word], 1.0, True) if word in SI else _looked_up(word, text)
-        dimension = dimension.times(own, power)
+        unit, factor, is_si = (SI[word], 1.0, True) if word in SI else _looked_up(word, text)
+        dimension = dimension.times(unit, power)
         only_si = only_si and is_si
         try:
             size *= factor**power

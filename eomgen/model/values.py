@@ -238,8 +238,8 @@ class Reader:
         """One of the words of a field; the default when it is another."""
         if isinstance(value, str) and value in field.choices:
             return value
-        shown = list(field.choices)
-        remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
+        allowed = list(field.choices)
+        remedy = nearest(value, allowed, "allowed") if isinstance(value, str) else f"allowed: {', '.join(allowed)}"
         self.fault(path, f"{quoted(value)} is not known", remedy, "EG-CHOICE")
         return str(field.default)
 
@@ -340,9 +340,9 @@ class Reader:
         """Message, column (none) and remedy for a marker that does not exist."""
         body, dot, name = label.partition(".")
         if body in self.bodies and dot:
-            own = [key.split(".", 1)[1] for key in self.markers if key.startswith(body + ".")]
-            near = hint(name, own)
-            have = ", ".join(own) or "none"
+            markers = [key.split(".", 1)[1] for key in self.markers if key.startswith(body + ".")]
+            near = hint(name, markers)
+            have = ", ".join(markers) or "none"
             return f"{body!r} has no marker {name!r}", 0, " ".join(x for x in (near, f"its markers: {have}") if x)
         return f"no body {body!r}", 0, nearest(body, self.faults.names_at(path, self.bodies), "bodies")
 
@@ -415,11 +415,11 @@ class Reader:
     # -- bodies, coordinates and shapes -------------------------------------------------------------------------------
     def body(self, path: str, value: Any) -> tuple[int, Body] | None:
         """The index of a body, and its mass."""
-        own = {body.name: k for k, body in enumerate(self.mass_data)}
-        if isinstance(value, str) and value in own:
-            return own[value], self.mass_data[own[value]]
+        index = {body.name: k for k, body in enumerate(self.mass_data)}
+        if isinstance(value, str) and value in index:
+            return index[value], self.mass_data[index[value]]
         if value is not None and not self.faults.under(f"bodies.{value}"):
-            self.unknown(path, "body", value, own, "bodies")
+            self.unknown(path, "body", value, index, "bodies")
         return None
 
     def coordinate(self, path: str, value: Any, measure: str = "") -> Found | None:
@@ -428,18 +428,18 @@ class Reader:
         None, and a fault, if there is none.
         """
         faults, raw = self.faults, name_of(value)
-        own = next((j for j in self.joints if j.entry.name == raw), None)
+        named = next((j for j in self.joints if j.entry.name == raw), None)
         home = next((j for j in self.joints if raw in j.coordinates), None)
-        if own is not None and home is not None and own is not home:
+        if named is not None and home is not None and named is not home:
             remedy = "rename one of them"
             faults.add(path, f"{raw!r} is a joint, and a coordinate of {home.entry.name!r}", remedy, "EG-NAME-TAKEN")
             return None
-        if own is not None and home is None and len(own.coordinates) != 1:
-            names = ", ".join(own.coordinates) or "none"
-            message = f"joint {quoted(raw)} has {len(own.coordinates)} coordinates"
+        if named is not None and home is None and len(named.coordinates) != 1:
+            names = ", ".join(named.coordinates) or "none"
+            message = f"joint {quoted(raw)} has {len(named.coordinates)} coordinates"
             faults.add(path, message, f"name one of them: {names}", "EG-REFERENCE")
             return None
-        joint = home or own
+        joint = home or named
         if joint is not None:
             name = str(raw) if home is not None else joint.coordinates[0]
             kind = joint.joint.coordinates[joint.coordinates.index(name)].kind

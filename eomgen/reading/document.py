@@ -291,8 +291,8 @@ def html(piece: Piece, names: Notation, look: Look) -> str:
         case Sentence():
             return f"<p{look.text}>{_html_text(piece.text, names, look)}</p>"
         case FormulaLine() | Row():
-            shown = _formula(piece, names, look)
-            return f"<div{look.formula}><math displaystyle='true'{look.math}>{shown}</math></div>"
+            formula = _formula(piece, names, look)
+            return f"<div{look.formula}><math displaystyle='true'{look.math}>{formula}</math></div>"
         case Table():
             head = "".join(f"<th{look.cell}>{_html_text(cell, names, look)}</th>" for cell in piece.head)
             rows = "".join(

@@ -95,9 +95,9 @@ class _Code:
     def __init__(self, equations: Readable, language: Language, form: str) -> None:
         self.language, self.form, self.model = language, form, equations.kinematics.mechanism.name
         named = equations.intermediates
-        own = equations.written("state_rates") if equations.states else ([], sympy.Matrix())
-        named = [*named, *own[0]]
-        whole = [*(x for _, x in named), *equations.mass_matrix, *equations.force, *own[1]]
+        rates = equations.written("state_rates") if equations.states else ([], sympy.Matrix())
+        named = [*named, *rates[0]]
+        whole = [*(x for _, x in named), *equations.mass_matrix, *equations.force, *rates[1]]
         unknown = {str(f.func) for x in whole for f in x.atoms(AppliedUndef)}
         if unknown:
             raise UnavailableError(
@@ -109,7 +109,7 @@ class _Code:
         put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}
         self.named = [(put[symbol], x.xreplace(put)) for symbol, x in named]
         self.mass, self.force = equations.mass_matrix.xreplace(put), equations.force.xreplace(put)
-        self.states = [x.xreplace(put) for x in own[1]]
+        self.states = [x.xreplace(put) for x in rates[1]]
         self.state_names = equations.kinematics.state_names
         inner = {symbol for symbol, _ in self.named}
         self.arguments = sorted(str(symbol) for symbol in put.values() if symbol not in inner)

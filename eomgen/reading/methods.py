@@ -287,9 +287,9 @@ def unknown_names(quantities: Quantities) -> tuple[str, ...]:
     names: list[str] = []
     for link, branch in zip(kinematics.links, kinematics.topology.branches, strict=True):
         joint = kinematics.mechanism.joints[branch.joint].name
-        own = [str(kinematics.a[link.first + c].node[1]) for c in range(len(link.columns))]
+        rates = [str(kinematics.a[link.first + c].node[1]) for c in range(len(link.columns))]
         names += twist_rate_names(kinematics, link.name)
-        names += own if tree.method == "amalgamated" else []
+        names += rates if tree.method == "amalgamated" else []
         names += wrench_names(kinematics, joint)
     left = len(tree.system.unknowns) - len(names)
     return (*names, *multiplier_names(kinematics, left))

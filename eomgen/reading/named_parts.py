@@ -208,5 +208,5 @@ def find_blocks(
     equations = tuple(tuple(i for i, x in enumerate(joints) if x == joint) for joint in dict.fromkeys(joints))
     if not 1 < len(coordinates) <= MOST or not 1 < len(equations) <= MOST or len(coordinates) == n:
         return None
-    held = sum(any(constraints[i][j] for i in rows for j in columns) for rows in equations for columns in coordinates)
-    return MatrixBlocks(coordinates, equations) if held < len(equations) * len(coordinates) else None
+    count = sum(any(constraints[i][j] for i in rows for j in columns) for rows in equations for columns in coordinates)
+    return MatrixBlocks(coordinates, equations) if count < len(equations) * len(coordinates) else None

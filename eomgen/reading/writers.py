@@ -49,11 +49,11 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
     if equations.mobility.n_dof == 0:
         result.append(f"  {STILL}")
     else:
-        shown = [*(_large(printed, columns) if printed.is_long else _equations(printed, columns))]
-        result += ["", *shown[:lines]]
-        if len(shown) > lines:
+        printed_lines = [*(_large(printed, columns) if printed.is_long else _equations(printed, columns))]
+        result += ["", *printed_lines[:lines]]
+        if len(printed_lines) > lines:
             where = "eqs.tree_system" if printed.of_loops else "eqs.mass_matrix, eqs.force, eqs.intermediates"
-            rest = f"... and {len(shown) - lines} lines more: {where}"
+            rest = f"... and {len(printed_lines) - lines} lines more: {where}"
             result += [rest, "or in a shell: eomgen derive MODEL --format text"]
         if remark := printed.remark:
             result += ["", *fold(remark, columns, "", "  ")]
@@ -66,8 +66,8 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
 
 def _values(printed: PrintedEquations, columns: int) -> list[str]:
     """What was put in."""
-    shown = ", ".join(printed.text(x).replace(" ", TIGHT) for x in printed.values)
-    return [plain(line) for line in fold(shown, columns, "  with ", "    ")] if shown else []
+    listed = ", ".join(printed.text(x).replace(" ", TIGHT) for x in printed.values)
+    return [plain(line) for line in fold(listed, columns, "  with ", "    ")] if listed else []
 
 
 def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
@@ -215,11 +215,11 @@ def _matrix_equation(M: list[list[str]], rates: list[str], f: list[str]) -> Iter
         yield f"  {a} {b} {'=' if k == middle else ' '} {c}"
 
 
-def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
+def _wrapped(label: str, text: str, columns: int) -> Iterator[str]:
     """A formula in lines that end where ``BREAKS`` says."""
     margin = " " * min(len(label) + 2, 12)
     line = f"  {label}"
-    together = SHORT_GROUP.sub(lambda group: group[0].replace(" ", TIGHT), shown)
+    together = SHORT_GROUP.sub(lambda group: group[0].replace(" ", TIGHT), text)
     for part in _fitting(together, columns - len(margin), BREAKS):
         if len(line) + len(part) > columns and line.strip():
             yield plain(line.rstrip())
@@ -228,26 +228,26 @@ def _wrapped(label: str, shown: str, columns: int) -> Iterator[str]:
     yield plain(line.rstrip())
 
 
-def _fitting(shown: str, width: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
+def _fitting(text: str, width: int, ways: Sequence[tuple[str, int, int]]) -> Iterator[str]:
     """Parts between which a line may end, each cut no further than it has to be to fit."""
     if not ways:
-        yield from (shown[k : k + width] for k in range(0, len(shown), width))
+        yield from (text[k : k + width] for k in range(0, len(text), width))
         return
-    for part in _parts(shown, *ways[0]):
+    for part in _parts(text, *ways[0]):
         if len(part) <= width:
             yield part
         else:
             yield from _fitting(part, width, ways[1:])
 
 
-def _parts(shown: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
+def _parts(text: str, space: str, deep: int, in_calls: int) -> Iterator[str]:
     """The parts between spaces of one kind, a sign with what comes after it.
 
     Spaces count within at most ``deep`` parentheses, ``in_calls`` of which are those of arguments.
     """
     piece, before = "", ""
     opened: list[str] = []  # what each open parenthesis is
-    for word in shown.split(space):
+    for word in text.split(space):
         for letter in word:
             if letter == "|":
                 opened = opened[:-1] if opened[-1:] == ["bar"] else [*opened, "bar"]
@@ -334,8 +334,8 @@ def equations_latex(equations: Readable) -> str:
     return "\n\n".join(f"$$\n{line}\n$$" for line in lines)
 
 
-def _text(words: str) -> str:
-    return rf"\text{{{words.replace('_', chr(92) + '_')}}}"
+def _text(text: str) -> str:
+    return rf"\text{{{text.replace('_', chr(92) + '_')}}}"
 
 
 def _latex(item: Piece, names: Notation) -> Iterator[str]:

@@ -277,8 +277,8 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
-    if (own := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
-        return own.__get__(one, type(one))
+    if (attribute := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
+        return attribute.__get__(one, type(one))
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
     answer = "simulate(...) returns a run, which has animate() and plot(); a module has draw() and page()"
     meant = answer if name in _SHOWS and "rhs" in public else _hint(name, public, len(public))
@@ -372,8 +372,8 @@ def both_names(function: Function) -> Function:
         try:
             return function(*args, **raw)
         except TypeError as error:
-            _, own, fault = str(error).partition(f"{function.__qualname__}()")
-            if not own:
+            _, subject, fault = str(error).partition(f"{function.__qualname__}()")
+            if not subject:
                 raise
             name = getattr(args[0], "name", "f") if function.__name__ == "__call__" else function.__name__
             needed = [n for n, one in taken.items() if one.default is one.empty and n not in ("self", "module")]

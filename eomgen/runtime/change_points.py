@@ -43,10 +43,10 @@ class ChangePoint(NamedTuple):
     coordinates: dict[str, float]  #: their values at that moment (m, rad)
 
     def __str__(self) -> str:
-        shown = ", ".join(f"{name} = {value:.4g}" for name, value in list(self.coordinates.items())[:6])
+        listed = ", ".join(f"{name} = {value:.4g}" for name, value in list(self.coordinates.items())[:6])
         more = ", ..." if len(self.coordinates) > 6 else ""
         freedoms = f"{self.degrees_of_freedom} degree{'s' * (self.degrees_of_freedom != 1)} of freedom"
-        return f"t = {self.time:.6g} s, {freedoms} at {shown}{more}"
+        return f"t = {self.time:.6g} s, {freedoms} at {listed}{more}"
 
 
 def scaled_jacobians(module: BoundModel, t: Array, x: Array, u: Array | None = None) -> Array:
@@ -136,15 +136,15 @@ class Looks:
         self.rank, self.n_q = layout.rank, layout.n_q
         self.curve = StatesBetween(module, t, x, u)
         ends = scaled_jacobians(module, t[[0, -1]], x[:, [0, -1]], self._inputs(t[[0, -1]]))
-        held = np.abs(ends).any(axis=(0, 1))
-        speed = np.abs(x[self.n_q :] / layout.scales.q[:, None])[held].max(axis=0, initial=0.0)
+        fixed = np.abs(ends).any(axis=(0, 1))
+        speed = np.abs(x[self.n_q :] / layout.scales.q[:, None])[fixed].max(axis=0, initial=0.0)
         motion = np.abs(np.diff(t)) * np.maximum(speed[1:], speed[:-1])
         parts = np.maximum(1.0, np.ceil(motion / max(SPACING, float(motion.sum()) / MOST))).astype(int)
         place = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
         self.times = np.append(place * np.repeat(np.diff(t) / parts, parts) + np.repeat(t[:-1], parts), t[-1])
         values = singular_values(module, self.times, self.curve(self.times), self._inputs(self.times))
         self.least = values[:, self.rank - 1]
-        self.held = held
+        self.held = fixed
 
     def continues(self, before: Looks) -> bool:
         """Whether a reset at a change point, where the part before ended, lets the mechanism go on across it."""

@@ -171,22 +171,22 @@ def evaluate(
     out: Array | None = None,
 ) -> Array:
     """``find`` of all states; where p or u are given state by state, (n, k), of each with its own."""
-    own: dict[str, Array] = {}
+    results: dict[str, Array] = {}
     for name, raw in (("p", p), ("u", u)):
         values = None if raw is None or isinstance(raw, Mapping) else read_numbers(name, raw)
         if values is not None and values.ndim > 1:
-            own[name] = values
-    if not own:
+            results[name] = values
+    if not results:
         states = prepare(module, t, x, p, u)
         return states.shaped(find(states), out)
     times, columns, single = read_states(module, t, x)
-    for name, values in own.items():
+    for name, values in results.items():
         n = module.n_p if name == "p" else module.n_u
         if single or values.shape != (n, len(times)):
             raise ill_shaped(f"{name} must have shape ({n},), or ({n}, k) for k states, not {values.shape}")
     parts = []
     for k in range(len(times)):
-        options = {"p": p, "u": u} | {name: np.ascontiguousarray(values[:, k]) for name, values in own.items()}
+        options = {"p": p, "u": u} | {name: np.ascontiguousarray(values[:, k]) for name, values in results.items()}
         parts.append(find(prepare(module, times[k : k + 1], columns[:, k : k + 1], **options)))
     return into(out, np.concatenate(parts, axis=-1))
 

@@ -342,8 +342,8 @@ def _calls(module: BoundModel) -> str:
         for call, size, result in rows
     )
     head = f"<tr><th {LEFT}>call</th><th>shape</th><th {LEFT}>result</th></tr>"
-    own = [name for name in dir(type(module)) if not name.startswith("_") and name not in {k.name for k in KERNELS}]
-    methods = ", ".join(f"<code>{html_text(n)}</code>" for n in own if _is_call(type(module), n))
+    public = [name for name in dir(type(module)) if not name.startswith("_") and name not in {k.name for k in KERNELS}]
+    methods = ", ".join(f"<code>{html_text(n)}</code>" for n in public if _is_call(type(module), n))
     return (
         f"<details><summary>what can be called</summary><table>{head}{cells}</table>"
         f"<p {LEFT}>and {methods}; <code>help(mod.simulate)</code> explains a method.</p></details>"
@@ -370,10 +370,10 @@ def trajectory_html(trajectory: Any) -> str:
 def small_plot(trajectory: Any) -> Any:
     """A figure of the coordinates, of the first ones where they are many."""
     figures = require("matplotlib.figure", "matplotlib", "a picture")
-    led = trajectory.metadata.get("led", ())
-    over = led[0] if led and len(trajectory) and trajectory.t[0] == trajectory.t[-1] else None
+    driven = trajectory.metadata.get("led", ())
+    over = driven[0] if driven and len(trajectory) and trajectory.t[0] == trajectory.t[-1] else None
     names = [name for name in trajectory.metadata["q_names"] if name != over][:CURVES]
-    panels, across = choose(trajectory, names, over, None, "time")
+    panels, abscissa = choose(trajectory, names, over, None, "time")
     figure = figures.Figure(figsize=(6.6, max(2.6, 0.75 * sum(map(height, panels)) + 0.5)), layout="constrained")
-    stack(figure, None, panels, across)
+    stack(figure, None, panels, abscissa)
     return figure

@@ -57,8 +57,8 @@ def spell(value: Any, depth: int = DEPTH) -> Any:
     if hasattr(value, "__func__"):
         return ["method", spell(value.__func__, depth - 1), spell(value.__self__, depth - 1)]
     if hasattr(value, "__code__"):
-        held = [_content(cell) for cell in value.__closure__ or ()]
-        around = [value.__defaults__, value.__kwdefaults__, held]
+        contents = [_content(cell) for cell in value.__closure__ or ()]
+        around = [value.__defaults__, value.__kwdefaults__, contents]
         return ["function", value.__module__, value.__qualname__, spell(value.__code__), spell(around, depth - 1)]
     return ["object", name, getattr(value, "__qualname__", ""), spell(_attributes(value), depth - 1)]
 

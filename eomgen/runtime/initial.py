@@ -127,8 +127,8 @@ def on_branches(kernels: Kernels, t: float, q: Array, J: Array, raw: Mapping[str
 def _parts(kernels: Kernels, J: Array, raw: Mapping[str, Sequence[Array]]) -> Iterator[tuple[Indices, Indices]]:
     """Rows and velocities of loops that are connected, by given velocities too."""
     known = kernels.layout.scales.known
-    held = [row != 0.0 for gradients in raw.values() for row in gradients]
-    pattern = np.array([*(np.ones(J.shape, dtype=bool) if known is None else known), *held])
+    fixed = [row != 0.0 for gradients in raw.values() for row in gradients]
+    pattern = np.array([*(np.ones(J.shape, dtype=bool) if known is None else known), *fixed])
     for levels in parts(pattern):
         rows = np.concatenate([level.rows for level in levels])
         if len(rows := np.sort(rows[rows < len(J)])):
@@ -160,9 +160,9 @@ class StartBranch:
         kept = int(np.count_nonzero(sizes > GONE * sizes[0]))
         self.lost, free = np.zeros((m, len(rows) - kept)), np.zeros((n, len(columns) - kept))
         self.lost[rows], free[columns] = U[:, kept:], V[kept:].T
-        held = np.array([row for gradients in raw.values() for row in gradients])
-        if len(held):
-            _, sizes, V = algebra.svd(held @ free)
+        fixed = np.array([row for gradients in raw.values() for row in gradients])
+        if len(fixed):
+            _, sizes, V = algebra.svd(fixed @ free)
             free = free @ V[int(np.count_nonzero(sizes > GONE)) :].T
         self.free, self.columns = free, columns
 
@@ -251,9 +251,9 @@ class StartBranch:
         labels = [layout.constraint_labels[i] for i in np.flatnonzero(rows > 0.1 * rows.max())]
         where = f"the mechanism is at a change point of {', '.join(labels[:6])}{place(layout.q, self.q)}"
         if not undecided.shape[1]:
-            shown = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.v, v, strict=True) if n in self.names)
+            listed = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.v, v, strict=True) if n in self.names)
             return AssemblyError(
-                f"{where}, and no motion continues with the velocities {shown or 'there'}; give those of one "
+                f"{where}, and no motion continues with the velocities {listed or 'there'}; give those of one "
                 "branch, or start a little beside this position",
                 code="EG-UNDETERMINED",
             )
@@ -265,10 +265,10 @@ class StartBranch:
             row = left[i] / np.linalg.norm(left[i])
             left = left - np.outer(left @ row, row)
             left[size == 0.0] = 0.0
-        shown = " or ".join(
+        listed = " or ".join(
             "(" + ", ".join(f"{n} = {x[layout.v.index(n)]:.12g}" for n in wanted) + ")" for x in result[:4]
         ) + (" or ..." if len(result) > 4 else "")
-        several = f"branches found have {shown}" if result else "no branch was found that has them"
+        several = f"branches found have {listed}" if result else "no branch was found that has them"
         return AssemblyError(
             f"{where}, where the given velocities do not distinguish its branches: {several}; give "
             f"{' and '.join(wanted)} too, or start a little beside this position",
@@ -351,9 +351,9 @@ def _of_marker(kernels: Kernels, name: str, what: str, marker: str) -> Wanted:
     marker = layout.plain(marker)  # leg.thigh.knee of an instance leg
     if marker not in data.markers and marker not in layout.bodies:
         raise unknown("marker or body", marker, (*data.markers, *layout.bodies))
-    own = marker in data.markers
-    body = data.markers[marker].body if own else layout.bodies.index(marker)
-    place = data.markers[marker].position if own else np.zeros(3)
+    known = marker in data.markers
+    body = data.markers[marker].body if known else layout.bodies.index(marker)
+    place = data.markers[marker].position if known else np.zeros(3)
     if body < 0:
         kind = "velocity" if of_velocities else "position"
         raise UnknownNameError(f"{name!r} is a {kind} on the ground, which does not move")
@@ -435,9 +435,9 @@ class Initial:
         """C_t (n_c,)."""
         return self.kernels.velocity_constraints(np.concatenate([q, np.zeros(self.layout.n_v)]), t=self.t)
 
-    def follow(self, start: Array, held: Mapping[str, float]) -> Array:
+    def follow(self, start: Array, fixed: Mapping[str, float]) -> Array:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
-        q = follow(self.system, start, held)
+        q = follow(self.system, start, fixed)
         if not self.system.aligned(q):
             raise AssemblyError("the axes of a joint flipped on the path there", code="EG-UNDETERMINED")
         return q
@@ -455,11 +455,11 @@ class Initial:
         except AssemblyError:
             return self.system.close(self.layout.q_reference, {}).q
 
-    def close_near(self, start: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Array:
+    def close_near(self, start: Array, fixed: Mapping[str, float], restarts: int = RESTARTS) -> Array:
         """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
-        result = self.system.close(start, held, restarts)
+        result = self.system.close(start, fixed, restarts)
         if result.residual > SETTLED:
-            return where_lost(self.system.closure(held), result.q)
+            return where_lost(self.system.closure(fixed), result.q)
         return result.q
 
     def used(self, declared: dict[str, float]) -> dict[str, float]:
@@ -500,9 +500,9 @@ class Initial:
         wanted = now = {name: value for name, value in now.items() if name not in known}
         blocked = start = None
         ways: tuple[dict[str, float], ...] = (before, {})
-        for held in ways:
+        for fixed in ways:
             try:
-                start = system.close(layout.q_reference, held).q
+                start = system.close(layout.q_reference, fixed).q
                 wanted = self.compatible(start, known, now) if known else now
                 return self.follow(start, wanted)
             except AssemblyError as error:
@@ -542,9 +542,9 @@ class Initial:
             return self.close_near(layout.q_reference, raw)  # these parameters close somewhere else, if anywhere
         soft = self.used(self.compatible(start, raw, declared))
         blocked = None
-        for held in ({**raw, **soft}, raw):
+        for fixed in ({**raw, **soft}, raw):
             try:
-                return self.follow(start, held)
+                return self.follow(start, fixed)
             except AssemblyError as error:
                 blocked = error
         try:
@@ -574,8 +574,8 @@ class Initial:
         declared = self.used({k: v for k, v in declared.items() if k not in guess})
         start = self.system.with_values(layout.q_reference, {**declared, **guess})
         soft = self.compatible(start, {}, {**ordered, **declared})
-        for held in (soft, {k: v for k, v in soft.items() if k in guess}):
-            result = close_nearest(self.system, start, held, guess)
+        for fixed in (soft, {k: v for k, v in soft.items() if k in guess}):
+            result = close_nearest(self.system, start, fixed, guess)
             if result is not None:
                 return result.q
         return self.system.close(start, {}).q
@@ -630,8 +630,8 @@ class Initial:
         if raw is not None:
             self._require_motion(q, raw)
             declared = self.compatible(q, raw, declared, positions=False) if declared else {}
-        held: dict[str, float | Array] = {**(raw or {}), **self.used(declared)}
-        return self.on_branch(q, self._solve_rates(q, held), list(held))
+        fixed: dict[str, float | Array] = {**(raw or {}), **self.used(declared)}
+        return self.on_branch(q, self._solve_rates(q, fixed), list(fixed))
 
     def on_branch(self, q: Array, v: Array, names: Sequence[str]) -> Array:
         """Velocities (n,) or (n, m), of which those named were given, as those of a motion also at a change point.
@@ -679,19 +679,19 @@ class Initial:
                     code="EG-CONTRADICTION",
                 )
 
-    def _solve_rates(self, q: Array, held: Mapping[str, float | Array]) -> Array:
+    def _solve_rates(self, q: Array, fixed: Mapping[str, float | Array]) -> Array:
         layout = self.layout
-        columns = np.broadcast_shapes(*map(np.shape, held.values()))
+        columns = np.broadcast_shapes(*map(np.shape, fixed.values()))
         v = np.zeros((layout.n_v, *columns))
-        indices = [layout.v.index(name) for name in held if name in layout.v]
-        v[indices] = np.reshape([np.broadcast_to(held[layout.v[i]], columns) for i in indices], v[indices].shape)
-        others = [name for name in held if name not in layout.v]
+        indices = [layout.v.index(name) for name in fixed if name in layout.v]
+        v[indices] = np.reshape([np.broadcast_to(fixed[layout.v[i]], columns) for i in indices], v[indices].shape)
+        others = [name for name in fixed if name not in layout.v]
         if not (layout.n_c or others):
             return v
         equations = None
         if others:
             y_q, y_t, scales = map(np.array, zip(*(self.rate_equation(q, name) for name in others), strict=True))
-            wanted = np.array([np.broadcast_to(held[name], columns) for name in others])
+            wanted = np.array([np.broadcast_to(fixed[name], columns) for name in others])
             equations = VelocityEquations(y_q, y_t, wanted, scales, others)
         C_q, labels = self._C_q(q, t=self.t), layout.constraint_labels
         return assemble_velocity(C_q, self.rate(q), self.scales, v, indices, equations, layout.v, labels)

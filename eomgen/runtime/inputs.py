@@ -410,8 +410,8 @@ class Forcing:
     @property
     def stepwise(self) -> bool:
         """Whether all inputs are constant between corners."""
-        held = all(isinstance(s, Signal) and s.order == 0 and s.corners for s in self.varying.values())
-        return held and not self.formulas
+        constant = all(isinstance(s, Signal) and s.order == 0 and s.corners for s in self.varying.values())
+        return constant and not self.formulas
 
     def encode(self) -> list[tuple[Any, ...]]:
         """The inputs that vary, as the compiled loop takes them."""
@@ -576,13 +576,13 @@ def fill_rates(
     signals = layout.signals
     for first, rates in layout.input_rates.items():
         last, order, value, at = (first, 0, raw[first], 0) if first in raw else ("", 0, None, 0)
-        led = first in raw or first in signals or first not in layout.u
+        prescribed = first in raw or first in signals or first not in layout.u
         for rate, times in rates:
-            led = led or rate in signals
+            prescribed = prescribed or rate in signals
             if rate in raw:
-                if not led and not (isinstance(raw[rate], int | float) and raw[rate] == 0):
+                if not prescribed and not (isinstance(raw[rate], int | float) and raw[rate] == 0):
                     raise incomplete(f"input {rate} is the rate of {first}, which is constant; give {first} too")
-                led = True
+                prescribed = True
                 last, order, value, at = rate, times, raw[rate], times
             elif last:
                 for _ in range(times - at):
@@ -709,8 +709,8 @@ def find_switch(
         before, after = left - beside, right + beside
         if before < low or after > high:
             continue
-        own = 2.0 * (after - before) * max(abs(rate(before, x)), abs(rate(after, x)))  # what it changes without a jump
-        if abs(value(after, x) - value(before, x)) > allowed + own:
+        rise = 2.0 * (after - before) * max(abs(rate(before, x)), abs(rate(after, x)))  # what it changes without a jump
+        if abs(value(after, x) - value(before, x)) > allowed + rise:
             return 0.5 * (left + right)
     return None
 
@@ -853,9 +853,9 @@ class Expression:
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
         code, numbers, _ = self.tape
-        own = [(OPERATIONS[op].arity, a, b) for op, a, b, _ in code if op in OPERATIONS and OPERATIONS[op].jumps]
-        added = [("sub", a, b, 0) for arity, a, b in own if arity == 2]
-        out = [*range(len(code), len(code) + len(added)), *(a for arity, a, _ in own if arity == 1)]
+        steps = [(OPERATIONS[op].arity, a, b) for op, a, b, _ in code if op in OPERATIONS and OPERATIONS[op].jumps]
+        added = [("sub", a, b, 0) for arity, a, b in steps if arity == 2]
+        out = [*range(len(code), len(code) + len(added)), *(a for arity, a, _ in steps if arity == 1)]
         return player(([*code, *added], numbers, out), p)
 
     def slopes(self, p: Array) -> Callable[[float, Array], Array]:

@@ -42,9 +42,9 @@ class LazyCore:
     ``further`` holds those made so far.
     """
 
-    def __init__(self, core: Core, late: Sequence[str], load: Callable[[str], Core]) -> None:
+    def __init__(self, core: Core, lazy: Sequence[str], load: Callable[[str], Core]) -> None:
         self.core = core
-        self.names = (*core.names, *(name for name in late if name not in core.names))
+        self.names = (*core.names, *(name for name in lazy if name not in core.names))
         self.load = load
         self.further: dict[str, Core] = {}
         self.run = core.run  # here, because every run asks for it
@@ -364,20 +364,20 @@ def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | No
         finite = kernels.kernel("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
         bad = [name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0]
         known = layout.info.not_finite_where
-        own = {known[name]: None for name in bad if name in known}
+        states = {known[name]: None for name in bad if name in known}
         if bad and set(bad) <= set(layout.reaction_laws):
             return (
                 f"the forces of {' and '.join(bad)} depend on reactions which they change so strongly that the motion "
                 "may have several solutions or none (Painleve's paradox); give smaller coefficients"
-                f"{''.join(f'; or {why}' for why in own)}"
+                f"{''.join(f'; or {why}' for why in states)}"
             )
-        held = [name for name in bad if name in layout.switches]
-        if held:
-            return f"the equations of {' and '.join(held)} are not (outside their domain, or a wheel lies flat)"
+        switches = [name for name in bad if name in layout.switches]
+        if switches:
+            return f"the equations of {' and '.join(switches)} are not (outside their domain, or a wheel lies flat)"
         loads = [name for name in bad if name not in layout.reaction_laws]
         if loads:
             ends = [] if known.keys() >= {*loads} else ["its ends meet or lie inside the cylinder"]
-            why = ", or ".join([*own, *ends, "its law is outside its domain"])
+            why = ", or ".join([*states, *ends, "its law is outside its domain"])
             return f"the loads of {' and '.join(loads)} are not ({why})"
     if "mass_matrix" in kernels.core.names and x.size >= layout.n_q:
         M = kernels.kernel("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
@@ -464,9 +464,9 @@ class Fail:
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif name == "resets" and (switches := self.layout.switches):
-            held = ", ".join(one for one, state in switches.items() if x[self.layout.x.index(state)] > 0.5)
+            closed = ", ".join(one for one, state in switches.items() if x[self.layout.x.index(state)] > 0.5)
             blame = (
-                f": not finite, or contrary to a constraint that is closed ({held or 'none'}), closes or never opens"
+                f": not finite, or contrary to a constraint that is closed ({closed or 'none'}), closes or never opens"
             )
             remedy = "give new values that obey it, or open it first (releases)"
         elif status == 4 and not len(self.layout.independent):
@@ -512,8 +512,8 @@ def flat_disc(kernels: Any, x: Array, t: float, p: Array | None) -> tuple[str, s
     poses = kernels.kernel("poses", nan=True)
     turns = np.concatenate([poses(x[: layout.n_q], t=t, p=p)[:, :3, :3], np.eye(3)[None]])  # the last is that of ground
     for name, wheel, axle, plane, normal in discs:
-        across = np.cross(turns[wheel] @ axle, turns[plane] @ normal)
-        if np.linalg.norm(across) < FLAT:
+        normal_to_both = np.cross(turns[wheel] @ axle, turns[plane] @ normal)
+        if np.linalg.norm(normal_to_both) < FLAT:
             what = f"constraint {name!r}: the disc lies flat (axle along the plane's normal)"
             return what, "the disc has fallen, or nearly; end the run before that, for example with an event"
     return None
@@ -532,8 +532,8 @@ def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
 
 def place(names: Sequence[str], x: Array) -> str:
     """``, theta = 0.3, s = 0.4``: the first coordinates of a state."""
-    shown = [f"{name} = {value:.6g}" for name, value in zip(names, x, strict=False)][:SHOWN]
-    return "".join(f", {item}" for item in shown) + (", ..." if len(names) > SHOWN else "")
+    listed = [f"{name} = {value:.6g}" for name, value in zip(names, x, strict=False)][:SHOWN]
+    return "".join(f", {item}" for item in listed) + (", ..." if len(names) > SHOWN else "")
 
 
 # -- constraints -------------------------------------------------------------------------------------------------------

@@ -417,8 +417,8 @@ class Layout:
 def _table(rows: Sequence[Sequence[int]], n: int) -> Any:
     """Which of n columns each row names (m, n)."""
     result = np.zeros((len(rows), n), dtype=bool)
-    for own, columns in zip(result, rows, strict=True):
-        own[list(columns)] = True
+    for row, columns in zip(result, rows, strict=True):
+        row[list(columns)] = True
     return result
 
 

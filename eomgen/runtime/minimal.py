@@ -101,9 +101,9 @@ class DependentMotion:
     def _way(self, start: Array, y1: Array, t: float) -> tuple[DependentMotion, Continuation]:
         """The notes and the continuation from a closed q along independent coordinates; s is the scaled distance."""
         y, n_q = start[self.layout.independent_q], len(start)
-        own = copy(self)  # notes of one path are neither another's nor another thread's
-        own.drifts = bool(self._kinematics(t, y, np.zeros_like(y), start)[n_q : n_q + len(self.scales.q)].any())
-        return own, Continuation(StraightPath(own, t, y, 0.0, y1), start, fewest=1)
+        motion = copy(self)  # notes of one path are neither another's nor another thread's
+        motion.drifts = bool(self._kinematics(t, y, np.zeros_like(y), start)[n_q : n_q + len(self.scales.q)].any())
+        return motion, Continuation(StraightPath(motion, t, y, 0.0, y1), start, fewest=1)
 
     def follow(self, start: Array, target: Array, t: float) -> Array:
         """From a closed q along the straight line to independent values."""
@@ -113,11 +113,11 @@ class DependentMotion:
         length = float(np.abs((target - origin) / self.scales_i).max(initial=0.0))
         self._require_near(target, length)
         y1 = (target - origin) / (length or 1.0)
-        own, way = self._way(start, y1, t)
+        motion, way = self._way(start, y1, t)
         self._go_on(way, target, length)
         result = way.reach(length)
         if result is None:
-            raise self._too_far(target, self._blocked(origin + way.points[-1].s * y1, own.failed))
+            raise self._too_far(target, self._blocked(origin + way.points[-1].s * y1, motion.failed))
         return result.q
 
     def follow_all(self, start: Array, targets: Array) -> list[Array]:
@@ -413,8 +413,8 @@ class Minimal:
         if not layout.rank or before is None or not len(chosen):
             return
         v, a = np.abs(motion.reshape(2, -1) / scales).max(axis=1)
-        own = np.abs(motion[chosen] / scales[chosen]).max()
-        if v <= AMPLIFIED * own:
+        largest = np.abs(motion[chosen] / scales[chosen]).max()
+        if v <= AMPLIFIED * largest:
             return
         for time, other in self._memory.recent:
             gap = abs(t - time)

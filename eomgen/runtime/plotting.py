@@ -132,13 +132,13 @@ def _between_steps(
         times = np.append((t[:-1, None] + np.diff(t)[:, None] * steps).ravel(), t[-1])
         times = times[np.append(True, np.diff(times) != 0.0)]
         layout = module.layout
-        own = [n for n in names if n in ENERGIES and n not in layout.x + layout.loops + layout.y + layout.u]
+        computed = [n for n in names if n in ENERGIES and n not in layout.x + layout.loops + layout.y + layout.u]
         try:
             columns = _columns_at(trajectory, module, times)
-            result = {name: columns[name] if name != "t" else times for name in names if name not in own}
-            three = refined_energies(trajectory, times, columns) if energies or own else None
+            result = {name: columns[name] if name != "t" else times for name in names if name not in computed}
+            three = refined_energies(trajectory, times, columns) if energies or computed else None
             if three is not None:
-                result |= {name: three[ENERGIES.index(name)] for name in own}
+                result |= {name: three[ENERGIES.index(name)] for name in computed}
             return times, result, three
         except EvaluationError:  # the cubic left what the model allows: its steps are drawn
             pass
@@ -213,17 +213,17 @@ def choose(
         raise at_odds(f"x= and kind={kind!r} cannot be used together; leave out one of them")
     if x is not None and not names:
         raise incomplete(f"plot(x={x!r}) names no column to draw against it; give y= or names of columns")
-    panels, across = KINDS[kind](trajectory, tuple(dict.fromkeys(names)), x)
+    panels, abscissa = KINDS[kind](trajectory, tuple(dict.fromkeys(names)), x)
     if not panels:
         raise cannot(f"there is nothing to plot of kind {kind!r}: the run has no coordinates")
-    return panels, across
+    return panels, abscissa
 
 
-def _show(panels: list[Curves], across: str, ax: Any) -> Any:
+def _show(panels: list[Curves], abscissa: str, ax: Any) -> Any:
     pyplot = require("matplotlib.pyplot", "matplotlib", "plot")
     if ax is None:
         figure = pyplot.figure(figsize=(8.2, sum(map(height, panels)) + 0.6), layout="constrained")
-        axes = stack(figure, None, panels, across)
+        axes = stack(figure, None, panels, abscissa)
         return axes[0] if len(axes) == 1 else np.array(axes, dtype=object)
     names = [name for panel in panels for name, _, _ in panel.curves]
     for panel in panels:
@@ -233,7 +233,7 @@ def _show(panels: list[Curves], across: str, ax: Any) -> Any:
     labels = [panel.label for panel in panels if panel.label]
     units = list(dict.fromkeys(label for label in labels))
     ax.set_ylabel(labels[0] if len(names) == 1 and labels else ", ".join(units))
-    ax.set_xlabel(across)
+    ax.set_xlabel(abscissa)
     if len(names) > 1:
         ax.legend(fontsize="small")
     return ax
@@ -246,7 +246,7 @@ def height(panel: Curves) -> float:
     return max(LOWEST, ROW * min(len(panel.curves), IN_A_COLUMN) + 0.3)
 
 
-def stack(figure: Any, grid: Any, panels: Sequence[Curves], across: str) -> list[Any]:
+def stack(figure: Any, grid: Any, panels: Sequence[Curves], abscissa: str) -> list[Any]:
     """Panels one above the other, sharing their horizontal axis and a part of the figure, all of it by default."""
     heights = [height(panel) for panel in panels]
     if grid is None:
@@ -255,12 +255,12 @@ def stack(figure: Any, grid: Any, panels: Sequence[Curves], across: str) -> list
         cells = grid.subgridspec(len(panels), 1, height_ratios=heights)
     axes: list[Any] = []
     for k, panel in enumerate(panels):
-        own = panel.across or k == 0
-        ax = figure.add_subplot(cells[k], sharex=None if own else axes[0])
+        labelled = panel.across or k == 0
+        ax = figure.add_subplot(cells[k], sharex=None if labelled else axes[0])
         draw_panel(ax, panel)
         axes.append(ax)
         if panel.across or k + 1 == len(panels):
-            ax.set_xlabel(panel.across or across)
+            ax.set_xlabel(panel.across or abscissa)
         else:
             ax.tick_params(labelbottom=False)
     figure.align_ylabels(axes)
@@ -332,8 +332,8 @@ def over_time(trajectory: Any, names: tuple[str, ...], x: str | None = None) -> 
     unit = trajectory.units.get(x, "")
     others = [trajectory.units.get(group[0], "") for group in by_unit(trajectory, names)]
     alike = [_one_scale(columns[x], unit, panel, other) for panel, other in zip(panels, others, strict=True)]
-    across = label(printed_names(trajectory.metadata)(x), unit)
-    return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], across
+    abscissa = label(printed_names(trajectory.metadata)(x), unit)
+    return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], abscissa
 
 
 def _one_scale(x: Array, unit: str, panel: Curves, other: str) -> bool:
@@ -358,8 +358,8 @@ def _phases(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[lis
         curves = [(printed(name), columns[name], columns[rate]) for name, rate in zip(group, rates, strict=True)]
         starts = [(float(x[0]), float(y[0])) for _, x, y in curves]
         rate = label(printed(rates[0]) if len(group) == 1 else "rate", trajectory.units.get(rates[0], ""))
-        across = label(printed(group[0]) if len(group) == 1 else "coordinate", trajectory.units.get(group[0], ""))
-        panels.append(Curves(rate, curves, starts, across=across))
+        abscissa = label(printed(group[0]) if len(group) == 1 else "coordinate", trajectory.units.get(group[0], ""))
+        panels.append(Curves(rate, curves, starts, across=abscissa))
     return panels, panels[0].across if panels else ""
 
 
@@ -388,8 +388,8 @@ def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[lis
         ("residual (m, rad)", position, trajectory.residuals.raw_position),
         ("of velocities (m/s, rad/s)", velocity, trajectory.residuals.raw_velocity),
     ):
-        shown = np.maximum(result, np.finfo(float).eps)  # a logarithm has no 0
-        curves = [("stored states", t, shown)]
+        positive = np.maximum(result, np.finfo(float).eps)  # a logarithm has no 0
+        curves = [("stored states", t, positive)]
         if raw > 0.0:
             curves.append(("raw, largest", t, np.full(len(t), raw)))
         panels.append(Curves(name, curves, logarithmic=True))

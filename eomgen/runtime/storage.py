@@ -69,10 +69,10 @@ def read_arrays(path: Path, compressed: bool = True, key: str = "") -> dict[str,
     return result
 
 
-def _read(file: BinaryIO, own: int, compressed: bool) -> dict[str, Any]:
+def _read(file: BinaryIO, header: int, compressed: bool) -> dict[str, Any]:
     with ZipFile(file) as archive:
         members = archive.infolist()
-        allowed = max(SMALL, UNFOLDED * own) if compressed else own
+        allowed = max(SMALL, UNFOLDED * header) if compressed else header
         if sum(member.file_size for member in members) > allowed:
             raise ValueError(f"its arrays would take more than {allowed} bytes")
         names = [member.filename.removesuffix(".npy") for member in members]

@@ -301,13 +301,13 @@ def project(
     """
     if not t.size or not (module.n_rows or module.layout.space):
         return NO_RESIDUALS, raw
-    led = forcing is not None and forcing.constrained
-    u = forcing.sample(t, raw) if led and forcing is not None else None
+    constrained = forcing is not None and forcing.constrained
+    u = forcing.sample(t, raw) if constrained and forcing is not None else None
     x = module.project(raw, t, None, u)
     if not module.n_rows:
         return NO_RESIDUALS, x
     here = u
-    if led and forcing is not None and forcing.feedback:
+    if constrained and forcing is not None and forcing.feedback:
         here = forcing.sample(t, x)
         x = module.project(x, t=t, u=here)
     if raw.size <= FEW and u is None:

@@ -508,11 +508,11 @@ def piece_collection(pieces: ScenePieces, ax: Any) -> Any:
         def do_3d_projection(self) -> float:
             """Project what is seen; the depth of it all, by which matplotlib orders collections."""
             projection = ax.get_proj()
-            shown = pieces.seen(self.corners, eye_of(projection))
-            x, y, z = proj_transform(*shown.corners.reshape(-1, 3).T, projection)
+            front = pieces.seen(self.corners, eye_of(projection))
+            x, y, z = proj_transform(*front.corners.reshape(-1, 3).T, projection)
             corners: Any = np.column_stack([x, y]).reshape(-1, 3, 2)
-            colors: Any = shown.colors
-            widths: Any = shown.widths
+            colors: Any = front.colors
+            widths: Any = front.widths
             self.set(verts=corners, facecolor=colors, edgecolor=colors, linewidth=widths)
             return float(np.min(z, initial=np.inf))
 

@@ -87,8 +87,8 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
         prescribed = trajectory.metadata.get("led") or trajectory.x_names[:1]
         over, unit = trajectory[prescribed[0]], trajectory.units.get(prescribed[0], "")
         said = [f"{prescribed[0]} = {value:.3f} {unit}" for value in over]
-        across = label(Notation.of(trajectory.metadata).mathtext(prescribed[0]), unit)
-        return MotionFrames(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over, across)
+        abscissa = label(Notation.of(trajectory.metadata).mathtext(prescribed[0]), unit)
+        return MotionFrames(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over, abscissa)
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)
     if speed is None:

@@ -123,11 +123,11 @@ def _floor(scene: Scene) -> Array:
     step = 10.0 ** np.floor(np.log10(reach / 2.0)) / 2.0
     low, high = np.floor(scene.low / step), np.ceil(scene.high / step)
     apart, lines = int(np.ceil((high - low)[sides].max() / MESHES)), []
-    for along, across in (sides, sides[::-1]):
-        for at in np.arange(low[across], high[across] + 1.0, apart):
+    for along, lateral in (sides, sides[::-1]):
+        for at in np.arange(low[lateral], high[lateral] + 1.0, apart):
             line = np.full((3, 3), np.nan)
             line[:2, k] = (scene.low if scene.up[k] > 0.0 else scene.high)[k]
-            line[:2, across], line[:2, along] = at * step, (low[along] * step, high[along] * step)
+            line[:2, lateral], line[:2, along] = at * step, (low[along] * step, high[along] * step)
             lines.append(line)
     return np.concatenate(lines)
 

@@ -88,6 +88,6 @@ def described(mechanism: Mechanism) -> list[Expr]:
 def rigid_bodies(numbers: Numbers, poses: Sequence[Pose]) -> list[Rigid]:
     """Bodies where they are."""
     return [
-        Rigid(own[0], pose.rotation @ own[1:4], pose.rotation @ own[4:].reshape(3, 3) @ pose.rotation.T)
-        for own, pose in zip(numbers.reshape(-1, 13), poses, strict=True)
+        Rigid(rows[0], pose.rotation @ rows[1:4], pose.rotation @ rows[4:].reshape(3, 3) @ pose.rotation.T)
+        for rows, pose in zip(numbers.reshape(-1, 13), poses, strict=True)
     ]

@@ -78,7 +78,7 @@ def _joints(model: CheckedModel) -> Finding:
     result, graph = Comparison(check), model.kinematics.graph
     cut = model.kinematics.loop_coordinates
     limits = model.bounds("poses", lambda: model.terms.poses)[1]
-    held = (
+    fixed = (
         model.bounds("constraints", lambda: model.terms.constraints)[1]
         if model.terms.constraints
         else np.zeros((0, len(model.states)))
@@ -105,7 +105,7 @@ def _joints(model: CheckedModel) -> Finding:
         C = model.module.kernels.constraint_jacobian(truth.case.q, **truth.case.timed)
         moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
         length = max(1.0, model.layout.length)
-        rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
+        rounding = float(fixed[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
             np.abs(C).max(initial=0.0)
         )
         limit = 8.0 * length * (float(limits[:, k].max(initial=0.0)) + UNIT + (1.0 + moved) * rounding)
@@ -142,8 +142,8 @@ def _freedoms(model: CheckedModel) -> Finding:
             inner = placed(truth, spec.successor, f"{spec.name} S")
             for name, (angular, linear) in zip(spec.velocities, columns, strict=True):
                 flat = truth.system.evaluate(f"column {name}", lambda a=angular, l=linear: [*a, *l], truth.values)  # type: ignore[misc]
-                own = _relative(truth, spec, names.index(name), inner)
-                gaps += [*numbers(own - np.concatenate([inner.rotation @ flat[:3], inner.rotation @ flat[3:]]))]
+                motion = _relative(truth, spec, names.index(name), inner)
+                gaps += [*numbers(motion - np.concatenate([inner.rotation @ flat[:3], inner.rotation @ flat[3:]]))]
                 labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
         limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, model.layout.length)
         result.add(k, gaps, limit, 1.0, labels)
@@ -236,9 +236,9 @@ def true_accelerations(model: CheckedModel, k: int) -> tuple[Array, Array, float
     truth = model.truths[k]
     a, multipliers = (numbers(x) for x in truth.solve(list(model.layout.rows)))
     mass = np.diag(numbers(truth.mass_matrix))
-    own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
-    limit = model.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
-    return a, limit, max(size_of(a), size_of(own))
+    sizes = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
+    limit = model.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + sizes)
+    return a, limit, max(size_of(a), size_of(sizes))
 
 
 def _accelerations(model: CheckedModel) -> Finding:
@@ -307,9 +307,9 @@ def _momenta(truth: Truth) -> Numbers:
     centre = sum((body.mass / mass * (pose.position + body.arm) for body, pose in parts), truth.zero)
     linear, angular = truth.zero, truth.zero
     for (body, pose), w in zip(parts, truth.twists, strict=True):
-        own = body.mass * w.at(body.arm)
-        linear = linear + own
-        angular = angular + body.inertia @ w.angular + bodies.cross(pose.position + body.arm - centre, own)
+        momentum = body.mass * w.at(body.arm)
+        linear = linear + momentum
+        angular = angular + body.inertia @ w.angular + bodies.cross(pose.position + body.arm - centre, momentum)
     return np.concatenate([centre, linear, angular])
 
 
@@ -453,8 +453,8 @@ def _unbalanced(
         point = placed(truth, spec.successor, f"{spec.name} S").position
         force, moment = exact(wrench).reshape(2, 3)
         if spec.coordinates and spec.coordinates[0] in along:
-            own = along[spec.coordinates[0]] * placed(truth, spec.predecessor, f"{spec.name} P").rotation[:, 2]
-            force, moment = (force, moment + own) if isinstance(spec.joint, TURNING) else (force + own, moment)
+            pull = along[spec.coordinates[0]] * placed(truth, spec.predecessor, f"{spec.name} P").rotation[:, 2]
+            force, moment = (force, moment + pull) if isinstance(spec.joint, TURNING) else (force + pull, moment)
         for end, sign in ((spec.successor, -1), (spec.predecessor, 1)):
             if end.body != GROUND:
                 take(end.body, sign * force, sign * moment, point - truth.here[end.body].position)
@@ -517,16 +517,16 @@ def _law(truth: Truth, force: ReactionFriction, spec: JointSpec, wrench: np.ndar
     """The force of a law at a reaction (ground axes), and how much it grows with that."""
     axis = numbers(placed(truth, spec.successor, f"{spec.name} S").rotation[:, 2])
     along = float(wrench[:3] @ axis)
-    across = float(np.linalg.norm(wrench[:3] - along * axis))
-    values = [_value(truth, force, *pair) for pair in ((across, along), (across + 1.0, along), (across, along + 1.0))]
+    radial = float(np.linalg.norm(wrench[:3] - along * axis))
+    values = [_value(truth, force, *pair) for pair in ((radial, along), (radial + 1.0, along), (radial, along + 1.0))]
     grown = abs(values[1] - values[0]) + abs(values[2] - values[0])
     return float(values[0]), float(grown)
 
 
-def _value(truth: Truth, force: ReactionFriction, across: float, along: float) -> Number:
+def _value(truth: Truth, force: ReactionFriction, radial: float, along: float) -> Number:
     kinematics, number = truth.system.kinematics, truth.mp.mpf
     names = [reaction_symbol(kinematics.graph, force.joint, k).node[1] for k in range(3)]
-    by_joint = dict(zip(names, (number(across), truth.zero, number(along)), strict=True))
+    by_joint = dict(zip(names, (number(radial), truth.zero, number(along)), strict=True))
     outputs = truth.system.evaluate(f"law of {force.name}", lambda: [_open(kinematics, force)], truth.values | by_joint)
     return outputs[0]
 

@@ -178,11 +178,11 @@ def _potentials(model: CheckedModel) -> Finding:
         slopes = _potential_slopes(model, truth)
         every, rest = truth.applied(), truth.applied(remainder=True)
         gap = numbers(every - rest + slopes)
-        own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
-        limit = (64.0 * UNIT if model.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + NO_FORCE
+        sizes = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
+        limit = (64.0 * UNIT if model.kinematics.graph.calls else FOLDED) * (sizes + size_of(sizes)) + NO_FORCE
         if "bias" in model.graph_kernels:  # folded constants weigh more beside half a turn, as rounding does
             limit = np.maximum(limit, FOLDED / UNIT * model.bounds("bias", model.graph_kernels["bias"])[1][:, k])
-        result.add(k, gap, limit, size_of(own), layout.v)
+        result.add(k, gap, limit, size_of(sizes), layout.v)
     return result.finding()
 
 

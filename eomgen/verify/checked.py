@@ -163,10 +163,10 @@ class CheckedModel:
         if len(C):
             rows = layout.rows
             back = np.abs(algebra.pinv(C))
-            held = rows[rows < layout.n_h]
+            switched = rows[rows < layout.n_h]
             E_q = (
-                back[:, : len(held)] @ self._at("constraints", k, (layout.n_h,))[1][held]
-                if len(held)
+                back[:, : len(switched)] @ self._at("constraints", k, (layout.n_h,))[1][switched]
+                if len(switched)
                 else np.zeros(layout.n_v)
             )
             E_v = back @ self._at("velocity_constraints", k, (layout.n_c,))[1][rows]

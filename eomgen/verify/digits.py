@@ -276,8 +276,8 @@ def _of_pairs(call: PairCall, raw: Sequence[Any]) -> Any:
     wrenches = 6 * call.function.bodies
     size[:wrenches] = np.repeat(size[:wrenches].reshape(-1, 6, *size.shape[1:]).max(axis=1), 6, axis=0)
     bounds = PAIR_ROUNDING * UNIT * size
-    for k, (a, own) in enumerate(operands):
-        error = own + PAIR_ROUNDING * UNIT * abs(a)
+    for k, (a, operand) in enumerate(operands):
+        error = operand + PAIR_ROUNDING * UNIT * abs(a)
         if np.any(error):
             shift = NUDGE * (1.0 + abs(a))
             up, down = (value([*at[:k], a + s, *at[k + 1 :]]) for s in (shift, -shift))

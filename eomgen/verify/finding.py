@@ -53,8 +53,8 @@ class Finding(NamedTuple):
         figures = {
             key: value if isfinite(value) else None for key, value in (("worst", self.worst), ("limit", self.limit))
         }
-        own = {"check": self.check, "ok": self.ok, "left_out": self.left_out}
-        return own | figures | {"where": self.where, "cases": self.states_compared, "note": self.note}
+        facts = {"check": self.check, "ok": self.ok, "left_out": self.left_out}
+        return facts | figures | {"where": self.where, "cases": self.states_compared, "note": self.note}
 
     @classmethod
     def skipped(cls, check: str, why: str) -> Finding:
@@ -111,8 +111,8 @@ class Verification(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as JSON has them."""
-        own = {"name": self.name, "ok": self.ok, "not_reached": self.not_reached}
-        return own | {"findings": [f.as_dict() for f in self.findings]}
+        facts = {"name": self.name, "ok": self.ok, "not_reached": self.not_reached}
+        return facts | {"findings": [f.as_dict() for f in self.findings]}
 
 
 def _cells(finding: Finding) -> tuple[str, ...]:

@@ -159,9 +159,9 @@ def _null(J: Array) -> Array:
 def _condition(M: Array, C: Array, scale: Array) -> float:
     """Condition of C scaled, times that of the embedded matrix at unit diagonal."""
     free = _null(C * scale) * scale[:, None]
-    own = algebra.cond(correlated(free.T @ M @ free)) if free.shape[1] else 1.0
+    condition = algebra.cond(correlated(free.T @ M @ free)) if free.shape[1] else 1.0
     rows = np.linalg.norm(C * scale, axis=1)
-    return float(own * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
+    return float(condition * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
 def _holding(check: str, module: BoundModel, states: Sequence[SystemState]) -> Finding:
@@ -207,10 +207,10 @@ def _minimal(check: str, module: BoundModel, states: Sequence[SystemState]) -> F
         minimal = Minimal(bound)
         minimal.reset(c.q)
         full = minimal.reduce(bound.rhs(c.t, c.x))
-        own = minimal.rhs(c.t, minimal.reduce(c.x))
+        reduced = minimal.rhs(c.t, minimal.reduce(c.x))
         condition = _condition(mass_at(module, c), jacobian_at(module, c), layout.scales.q)
         size = size_of(bound.rhs(c.t, c.x))
-        result.add(c.number, own - full, CLOSED * condition * size, size, minimal.x_names)
+        result.add(c.number, reduced - full, CLOSED * condition * size, size, minimal.x_names)
     return result.finding()
 
 
@@ -312,8 +312,8 @@ def _scales(module: BoundModel, c: SystemState, by: str) -> Array:
     layout = module.layout
     if by == "x":
         kinds = layout.coordinate_kinds
-        own = np.array([layout.length if kind == "length" else 1.0 for kind in kinds])
-        return np.concatenate([own, layout.scales.q])
+        lengths = np.array([layout.length if kind == "length" else 1.0 for kind in kinds])
+        return np.concatenate([lengths, layout.scales.q])
     values = c.u if by == "u" else c.p
     return np.where(values != 0.0, np.abs(values), 1.0) * (1.0 if by == "u" else 0.2)
 

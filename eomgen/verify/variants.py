@@ -185,8 +185,8 @@ class _Moved:
         if isinstance(x, dict):
             return {key: self.of(part) for key, part in x.items()}
         if is_dataclass(x) and not isinstance(x, type):
-            held = {f.name: getattr(x, f.name) for f in fields(x)}
-            changed = {name: new for name, old in held.items() if (new := self.of(old)) is not old}
+            values = {f.name: getattr(x, f.name) for f in fields(x)}
+            changed = {name: new for name, old in values.items() if (new := self.of(old)) is not old}
             return replace(x, **changed) if changed else x
         return x
 

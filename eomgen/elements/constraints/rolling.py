@@ -116,8 +116,8 @@ class RollingDisc(Wheeled):
         return above - (self.radius - self.tube) * s - self.tube
 
     def contact(self, view: ConstraintView) -> Vec3:
-        n, across, s = self._lean(view)
-        rim = vec.scale((self.tube - self.radius) / s, across)
+        n, lateral, s = self._lean(view)
+        rim = vec.scale((self.tube - self.radius) / s, lateral)
         return vec.sub(rim, vec.scale(self.tube, n))
 
 

@@ -32,11 +32,11 @@ def beyond_zero(x: Expr, law: Callable[[Expr], Expr]) -> Expr:
     return where(inside, law(where(inside, x, 1.0)), 0.0)
 
 
-def map_law(law: Any, own: Callable[[Expr], Expr]) -> Any:
+def map_law(law: Any, change: Callable[[Expr], Expr]) -> Any:
     """A law with other expressions: its own, and those of the laws in it."""
     parts = {field.name: getattr(law, field.name) for field in fields(law)}
-    laws = {name: x.mapped(own) for name, x in parts.items() if hasattr(x, "mapped")}
-    return replace(law, **laws, **{name: own(x) for name, x in parts.items() if isinstance(x, Expr)})
+    laws = {name: x.mapped(change) for name, x in parts.items() if hasattr(x, "mapped")}
+    return replace(law, **laws, **{name: change(x) for name, x in parts.items() if isinstance(x, Expr)})
 
 
 # -- the class ---------------------------------------------------------------------------------------------------------

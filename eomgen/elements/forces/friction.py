@@ -32,9 +32,9 @@ class DryFriction(Record, ABC):
     def in_plane(self, slip: Slip) -> Vec3:
         """Friction at a sliding velocity, with the direction of the velocity."""
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> DryFriction:
+    def mapped(self, change: Callable[[Expr], Expr]) -> DryFriction:
         """The law with other expressions, in the graph of a pair; without its states."""
-        law: DryFriction = map_law(self, own)
+        law: DryFriction = map_law(self, change)
         return law
 
     def on_pad(self, area: Expr) -> DryFriction:
@@ -227,8 +227,8 @@ class LuGre(LineFriction):
         relaxed = self.stiffness / self.damping
         return tuple(-relaxed * z for z in self.deflections)
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> LuGre:
-        return replace(map_law(self, own), deflections=(), lateral=None)  # type: ignore[no-any-return]
+    def mapped(self, change: Callable[[Expr], Expr]) -> LuGre:
+        return replace(map_law(self, change), deflections=(), lateral=None)  # type: ignore[no-any-return]
 
     def holding(self, states: tuple[Expr, ...], lateral: Vec3 | None) -> LuGre:
         return replace(self, deflections=states, lateral=lateral)

@@ -61,9 +61,9 @@ class NormalLaw(ABC):
     def energy(self, depth: Expr) -> Expr:
         """The potential of the elastic part (J)."""
 
-    def mapped(self, own: Callable[[Expr], Expr]) -> NormalLaw:
+    def mapped(self, change: Callable[[Expr], Expr]) -> NormalLaw:
         """The law with other expressions, in the graph of a pair."""
-        law: NormalLaw = map_law(self, own)
+        law: NormalLaw = map_law(self, change)
         return law
 
     def at(self, radius: Callable[[], Expr]) -> NormalLaw:

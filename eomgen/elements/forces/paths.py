@@ -292,17 +292,17 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
     # tangents touch
     cross, dot = s * (a[0] * b[1] - a[1] * b[0]), a[0] * b[0] + a[1] * b[1]
     w = PI + atan2(-cross, -dot) - atan2(t_a, r) - atan2(t_b, r)
-    across = t_a + r * w + t_b
+    arc = t_a + r * w + t_b
     h = b[2] - a[2]
-    length = sqrt(across * across + h * h)
+    length = sqrt(arc * arc + h * h)
     # radial directions to where the path touches first (p) and last (q)
     p = ((a[0] * r - s * a[1] * t_a) / square_a, (a[1] * r + s * a[0] * t_a) / square_a)
     q = ((b[0] * r + s * b[1] * t_b) / square_b, (b[1] * r - s * b[0] * t_b) / square_b)
-    planar, rise = s * across / length, h / length
+    planar, rise = s * arc / length, h / length
     leaving: Vec3 = (-p[1] * planar, p[0] * planar, rise)
     arriving: Vec3 = (-q[1] * planar, q[0] * planar, rise)
-    first: Vec3 = (r * p[0], r * p[1], a[2] + h * t_a / across)
-    last: Vec3 = (r * q[0], r * q[1], b[2] - h * t_b / across)
+    first: Vec3 = (r * p[0], r * p[1], a[2] + h * t_a / arc)
+    last: Vec3 = (r * q[0], r * q[1], b[2] - h * t_b / arc)
     turns = vec.cross(first, leaving), vec.cross(last, arriving)
     torque = vec.sub(*turns)
 
@@ -323,7 +323,7 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
         vec.sub(leave, arrive),
         chosen(torque, o),
         (chosen(turns[0], o), chosen(turns[1], o)),
-        where(touching, w * across / length, 0.0),
+        where(touching, w * arc / length, 0.0),
     )
 
 

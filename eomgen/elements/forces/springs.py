@@ -299,7 +299,7 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
 def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
     """Keys of a law of ``of``, its dimension and that of ``rate``."""
     local = {"length": LENGTH, "angle": NONE, "rate": rate}
-    names = {name: Scalar("", dimension=own) for name, own in local.items()}
+    names = {name: Scalar("", dimension=dimension) for name, dimension in local.items()}
     return {
         "law": Scalar(
             f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "

@@ -237,13 +237,13 @@ class Brush(TyreLaw):
         adheres = graph.apply("lt", r, 1.0)
         s = where(adheres, r, 1.0)
         slope = where(adheres, most * theta * (3.0 - 3.0 * s + s * s) / turning, most / where(sliding, size, 1.0))
-        along, across = -slope * kappa, -slope * tangent
+        along, lateral = -slope * kappa, -slope * tangent
         if self.half is None:
-            return TyreForces(along, across, graph.zero, graph.zero)
+            return TyreForces(along, lateral, graph.zero, graph.zero)
         rest = 1.0 - s
         trail = self.half / 3.0 * rest * rest * rest / (rest + s * s / 3.0)
         onwards = where(graph.apply("lt", rolling, 0.0), -slips.way, slips.way)  # the tread's, not the wheel's
-        return TyreForces(along, across, -onwards * trail * across, graph.zero)
+        return TyreForces(along, lateral, -onwards * trail * lateral, graph.zero)
 
     def gradients(self, slips: Slips, load: Expr) -> tuple[Expr, Expr]:
         """1 - r + r^2 / 3 across and (1 - r)^2 along, by |1 - w kappa|; where all slides 1 / (3 theta |s|) and 0."""
@@ -335,11 +335,11 @@ class MagicFormula(TyreLaw):
         pure = sine(K / (p("pCy1") * D), p("pCy1"), D, graph.apply("min", E, 1.0), y) + load * lift
         B = p("rBy1") * cosine(1.0, p("rBy2") * (tangent - p("rBy3")))
         shift = way * p("rHy1")
-        across = pure * cosine(p("rCy1"), B * (kappa + shift)) / cosine(p("rCy1"), B * shift)
+        lateral = pure * cosine(p("rCy1"), B * (kappa + shift)) / cosine(p("rCy1"), B * shift)
         sway = D * (p("rVy1") + p("rVy2") * excess + p("rVy3") * camber) * cosine(1.0, p("rVy4") * tangent)
-        across = across + way * sway * graph.apply("sin", p("rVy5") * atan(p("rVy6") * kappa))
-        gain = graph.apply("max", 0.0, along * slips.along + across * tangent)
-        return TyreForces(along, across, graph.zero, -way * gain)
+        lateral = lateral + way * sway * graph.apply("sin", p("rVy5") * atan(p("rVy6") * kappa))
+        gain = graph.apply("max", 0.0, along * slips.along + lateral * tangent)
+        return TyreForces(along, lateral, graph.zero, -way * gain)
 
 
 # -- tyres -------------------------------------------------------------------------------------------------------------
@@ -462,7 +462,7 @@ class Tyre(Force):
         upright = sqrt(1.0 - tilt * tilt)  # cos of the camber
         up = vec.scale(1.0 / upright, vec.sub(normal, vec.scale(tilt, axis)))  # in the wheel's plane
         along = vec.scale(1.0 / upright, vec.cross(axis, normal))
-        across = vec.cross(normal, along)
+        lateral = vec.cross(normal, along)
         whirl = view.angular_velocity(self.road)
         spin = vec.sub(view.angular_velocity(self.wheel), whirl)  # against the road, as all that follows
         omega = vec.dot(spin, axis)
@@ -478,7 +478,7 @@ class Tyre(Force):
         return _WheelMotion(
             normal,
             along,
-            across,
+            lateral,
             tilt,
             upright,
             lowest,
@@ -489,7 +489,7 @@ class Tyre(Force):
             view.graph.apply("asin", tilt),
             vec.dot(along, velocity),
             omega * self.rolling_radius,
-            vec.dot(across, velocity),
+            vec.dot(lateral, velocity),
         )
 
     def _slips(self, way: _WheelMotion) -> tuple[Expr, Expr]:
@@ -518,8 +518,8 @@ class Tyre(Force):
         slips = Slips(*self._slips(way), way.camber, view.graph.apply("tanh", way.forward / self.reversal))
         bears = view.graph.apply("lt", 0.0, load)
         result = self.law.forces(slips, where(bears, load, 1.0))
-        along, across, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in result))
-        sliding = vec.add(vec.scale(along + drag, way.along), vec.scale(across, way.across))
+        along, lateral, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in result))
+        sliding = vec.add(vec.scale(along + drag, way.along), vec.scale(lateral, way.across))
         lag = along * (way.arm - self.rolling_radius) + drag * way.arm - moment * way.tilt  # about the axle
         pressing = vec.scale(push, way.normal)
         turn = vec.add(vec.scale(moment, way.normal), vec.scale(lag / way.upright, way.across))
@@ -558,14 +558,14 @@ class Tyre(Force):
     def _shares(self, way: _WheelMotion, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
         """Rates of the deflections of the motion that the tyre takes up: of a tread beside the rest of a carcass."""
         (u, v), (x, y), graph = self.deflections, self.relaxation, load.graph
-        held = Slips(u / x, v / y, way.camber, graph.apply("tanh", way.forward / self.reversal))
-        result = None if (y - x).is_zero else self.law.gradients(held, load)
+        limited = Slips(u / x, v / y, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        result = None if (y - x).is_zero else self.law.gradients(limited, load)
         if result is None:
             return lambda along, across: (along, across)
         around, outwards = result
-        size, tread = held.size(), graph.apply("min", x, y)
+        size, tread = limited.size(), graph.apply("min", x, y)
         some = graph.apply("lt", 0.0, size)
-        c, s = (where(some, one / where(some, size, 1.0), 0.0) for one in (held.along, held.across))
+        c, s = (where(some, one / where(some, size, 1.0), 0.0) for one in (limited.along, limited.across))
         bend = outwards - around
         a, b = tread + (x - tread) * (around + bend * c * c), (x - tread) * bend * c * s
         d, e = (y - tread) * bend * c * s, tread + (y - tread) * (around + bend * s * s)

@@ -336,19 +336,19 @@ def project(runs: Runs, block: RunBlock) -> None:
 
 def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
-    led = runs.forcing.constrained
+    constrained = runs.forcing.constrained
 
     def bring(columns: list[int]) -> None:
         part, at, raw = states[:, :, columns], times[:, columns], runs.varied.column(columns[0])
         good = np.asarray(np.isfinite(part).all(axis=0))
         if not good.any():
             return
-        if led:
+        if constrained:
             raw["u"] = runs.forcing_of(columns[0]).sample(at[good], part[:, good])
         part[:, good] = runs.module.project(part[:, good], t=at[good], **raw)
         states[:, :, columns] = part
 
-    for k, reason in runs.varied.in_groups(runs.module.layout, [*range(runs.count)], led, bring).items():
+    for k, reason in runs.varied.in_groups(runs.module.layout, [*range(runs.count)], constrained, bring).items():
         block.status[k], block.texts[k], states[:, :, k] = FAILED, reason, np.nan
 
 

@@ -314,8 +314,8 @@ class Ensemble(Result):
             raise cannot(f"{self._kept_only}; run it with reduce='states' or 'statistics'")
         varied = self.varied()
         # an initial value of the grid is called as in `varied`, so that it does not hide the column of its name
-        own = {*self._module.p_names, *self._module.u_names}
-        labels = {name: name if name in own else f"initial_{name}" for name in self.grid}
+        names = {*self._module.p_names, *self._module.u_names}
+        labels = {name: name if name in names else f"initial_{name}" for name in self.grid}
         run = free("run", {*self.names, *varied})
         dimensions = tuple(labels.values()) or (run,)
         shape = tuple(map(len, self.grid.values())) or (self.count,)
@@ -685,8 +685,8 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
     for name, rate in rate_pairs(layout):
         if name in rest and rate in rest and np.any(np.asarray(rest[rate], dtype=float) != 0.0):
             raise untrue(f"input {rate} is not the rate of {name}, which is a number in each run; give {rate} as 0")
-    held = {rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}
-    return tables, {**{name: x for name, x in rest.items() if name not in only}, **held} or None
+    fixed = {rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}
+    return tables, {**{name: x for name, x in rest.items() if name not in only}, **fixed} or None
 
 
 def _open_store(folder: str | Path, runs: Runs, reduce: Any, parts: list[tuple[int, int]]) -> Store:

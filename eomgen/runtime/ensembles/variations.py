@@ -329,11 +329,11 @@ def _assemble_all(
     free = not module.n_rows and not layout.space
     if varied.states is not None and free:
         return np.array(varied.states), {}
-    led, x = forcing_of(0).constrained, np.full((module.n_x, varied.count), np.nan)
+    constrained, x = forcing_of(0).constrained, np.full((module.n_x, varied.count), np.nan)
 
     def assemble(columns: list[int]) -> None:
         k = columns[0]
-        if led:  # constraints depend on inputs that vary
+        if constrained:  # constraints depend on inputs that vary
             values = {name: float(value[k] if np.ndim(value) else value) for name, value in varied.values.items()}
             raw: Any = (values or None) if varied.states is None else varied.states[:, k]
             x[:, k] = find_state(module.rebound(**varied.column(k)), raw, t, forcing_of(k))
@@ -343,17 +343,17 @@ def _assemble_all(
             x[:, columns] = _assemble_named(module, varied, columns, t)
 
     every, good = [*range(varied.count)], np.zeros(varied.count, dtype=bool)
-    if every and not (led or varied.differ):
+    if every and not (constrained or varied.differ):
         assemble(every)
         return x, {}
     differ = varied.starts_differ and layout.n_v <= DENSE  # the same for every block
-    if varied.states is None and not led and (free or differ):
+    if varied.states is None and not constrained and (free or differ):
         most = max(ROOM // (layout.n_c * layout.n_v + 1), 1)
         parts = [varied.part(i, i + most) for i in range(0, varied.count, most)]
         result = [assemble_batch(module.kernels, part.values, part.count, part.p, part.u, t) for part in parts]
         good = np.concatenate([good[:0], *(one for _, one in result)])
         x[:, good] = np.hstack([x[:, :0], *(one for one, _ in result)])[:, good]
-    return x, varied.in_groups(layout, np.flatnonzero(~good).tolist(), led, assemble)
+    return x, varied.in_groups(layout, np.flatnonzero(~good).tolist(), constrained, assemble)
 
 
 def _assemble_named(module: BoundModel, varied: Variations, columns: list[int], t: float) -> Array:

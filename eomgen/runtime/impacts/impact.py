@@ -183,8 +183,8 @@ def find_sliding(
     for k, name in enumerate(names):
         j = layout.y.index(name) if name in layout.y else -1
         if j < 0 or not (_is_velocity(layout, name) or slopes[j, n_q : layout.n_x].any()):  # a place, whose rate it is
-            own = Gaps(module, (name,), forcing)
-            rows[k], rates[k] = own.normals(t, x)[0], own.rates(t, x)[0]
+            this_gap = Gaps(module, (name,), forcing)
+            rows[k], rates[k] = this_gap.normals(t, x)[0], this_gap.rates(t, x)[0]
             continue
         by_v = slopes[j, n_q : layout.n_x]
         uneven = np.abs(by_v - rest[j, n_q : layout.n_x]) > ROUNDED * np.abs(by_v)
@@ -377,14 +377,14 @@ def apply(
     else:
         impulses, change = np.zeros(len(rates)), np.zeros_like(v)
     after = np.concatenate([states.q[:, 0], v + change])
-    held = solve_multipliers(C_q[None], (M @ change - rows.T @ impulses)[:, None], scales)[: layout.n_c, 0]
+    reactions = solve_multipliers(C_q[None], (M @ change - rows.T @ impulses)[:, None], scales)[: layout.n_c, 0]
     lost = 0.0 - float(change @ M @ (v + 0.5 * change))
     before = np.ascontiguousarray(states.x[:, 0])
     final = rates + rows @ change
     rubbed = [
         {names[i]: x[count:][sliding.owner == i] for i in sliding.owner.tolist()} for x in (impulses, rates, final)
     ]
-    return Impact(after, before, tuple(names), impulses[:count], rates[:count], final[:count], held, lost, *rubbed)
+    return Impact(after, before, tuple(names), impulses[:count], rates[:count], final[:count], reactions, lost, *rubbed)
 
 
 def _rounding(rows: Array, v: Array, B: Array, condition: float, layout: Layout) -> tuple[Array, Array]:

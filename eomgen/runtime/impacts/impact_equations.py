@@ -113,8 +113,8 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
         now = rates[:count] + gaps.T @ change
         if k == ROUNDS:
             break
-    held = algebra.lstsq(locks, change - gaps @ impulses, rcond=None) if locks.shape[1] else np.zeros(0)
-    return np.concatenate([impulses, held]) / sizes, change
+    reactions = algebra.lstsq(locks, change - gaps @ impulses, rcond=None) if locks.shape[1] else np.zeros(0)
+    return np.concatenate([impulses, reactions]) / sizes, change
 
 
 def _need(rates: Array, e: Array, rest: Array) -> Array:
@@ -209,11 +209,11 @@ def _residual(W: Array, c: Array, mu: float, P: Array) -> float:
     P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods,
     Comput. Methods Appl. Mech. Eng. 92 (1991), 353-375.
     """
-    y, normal, across = c + W @ P, W[0, 0] or 1.0, W[1, 1] + W[2, 2] or 1.0
+    y, normal, tangential = c + W @ P, W[0, 0] or 1.0, W[1, 1] + W[2, 2] or 1.0
     pressed = max(float(P[0] - y[0] / normal), 0.0)
-    pulled = P[1:] - y[1:] / across
+    pulled = P[1:] - y[1:] / tangential
     part = min(1.0, mu * pressed / max(float(np.sqrt(pulled @ pulled)), np.finfo(float).tiny))
-    return float(np.abs([normal * (P[0] - pressed), *(across * (P[1:] - part * pulled))]).max())
+    return float(np.abs([normal * (P[0] - pressed), *(tangential * (P[1:] - part * pulled))]).max())
 
 
 def _angles(W: Array, c: Array, mu: float) -> Array:
@@ -303,7 +303,7 @@ def strike_rough(
         if not (rates[group] < 0.0).any():
             continue
         places = [[i, *(k + np.flatnonzero(owner == i))] for i in group]
-        every = [j for own in places for j in own]
+        every = [j for members in places for j in members]
         if len(group) == 1 and len(every) <= 2:
             i = group[0]
             result[every] = _in_the_plane(W[np.ix_(every, every)], rates[every], rest[i], mu[i], e[i], names[i])
@@ -370,8 +370,8 @@ def _together(
     """Impulses of gaps by Newton's and Coulomb's laws for the velocities after, in the order of the places."""
     m, d = len(places), max(map(len, places))
     where = np.full((m, d), -1)
-    for row, own in zip(where, places, strict=True):
-        row[: len(own)] = own
+    for row, members in zip(where, places, strict=True):
+        row[: len(members)] = members
     there = (where >= 0).ravel()
     chosen = where.ravel()[there]
     full = np.zeros((m * d, m * d))
@@ -429,9 +429,9 @@ def require_distances(
     if not joints or not rubs.size or depend or "poses" not in module.kernels.core.names:
         return
     for gap in sorted({*sliding.owner[rubs].tolist()}):
-        own = [k for k in rubs.tolist() if sliding.owner[k] == gap]
-        rows = np.vstack([normals[gap], sliding.rows[own]])
-        said = [f"gap {names[gap]}", *(f"sliding velocity {sliding.names[k]}" for k in own)]
+        rubbing = [k for k in rubs.tolist() if sliding.owner[k] == gap]
+        rows = np.vstack([normals[gap], sliding.rows[rubbing]])
+        said = [f"gap {names[gap]}", *(f"sliding velocity {sliding.names[k]}" for k in rubbing)]
         crossed = [np.abs(rows[:, places]).max(initial=0.0) > MEASURED for _, _, _, places in joints]
         for j in np.flatnonzero(crossed).tolist():
             chain, name = [j], joints[j][0]

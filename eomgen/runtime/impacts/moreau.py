@@ -102,8 +102,8 @@ class ColumnsWithForces(Columns):
 
     def __init__(self, others: Columns, forces: ContactForces) -> None:
         super().__init__(others.module, others.t, others.x, others.u, others._steps)
-        own = {f"{what}({name})": (what, name) for name in forces.names for what in MEANS}
-        self.forces, self._own = forces, {name: what for name, what in own.items() if name not in self.names}
+        columns = {f"{what}({name})": (what, name) for name in forces.names for what in MEANS}
+        self.forces, self._own = forces, {name: what for name, what in columns.items() if name not in self.names}
         self.names = (*self.names, *self._own)
         self.units = {name: MEANS[what] for name, (what, _) in self._own.items()}
 
@@ -229,8 +229,8 @@ class ContactForces:
             first, second = int(row[0]), int(row[1])
             (name, one), (_, other) = self._shapes[first], self._shapes[second]
             ends = self._bodies[first], self._bodies[second]
-            across = float(np.hypot(row[12], row[13]))
-            result.append(ContactForce(name, one, other, *ends, row[8:11], row[2:5], force, float(row[11]), across))
+            tangential = float(np.hypot(row[12], row[13]))
+            result.append(ContactForce(name, one, other, *ends, row[8:11], row[2:5], force, float(row[11]), tangential))
         return result
 
     def _single(self) -> Sequence[Array]:
@@ -263,10 +263,10 @@ class ForceSums:
         rows[:, 11:] /= h
         if len(rows):
             group = np.searchsorted(self.starts, rows[:, 0], side="right")
-            across = np.hypot(rows[:, 12], rows[:, 13])
+            tangential = np.hypot(rows[:, 12], rows[:, 13])
             n = len(self.starts)
             self.sums[:, 0, k] = np.bincount(group, rows[:, 11], n)
-            self.sums[:, 1, k] = np.bincount(group, across, n)
+            self.sums[:, 1, k] = np.bincount(group, tangential, n)
             self.sums[:, 2, k] = np.bincount(group, rows[:, 11] > 0.0, n)
         if self.kept is not None:
             self.kept.append(rows)

@@ -58,8 +58,8 @@ class DrivenCoordinates:
     They are of the tree or of cut joints.
     """
 
-    def __init__(self, module: BoundModel, led: Sequence[str]) -> None:
-        self.module, self.led = module, tuple(led)
+    def __init__(self, module: BoundModel, driven: Sequence[str]) -> None:
+        self.module, self.led = module, tuple(driven)
         self.layout = layout = module.layout
         self.scales = layout.scales
         kernels = module.kernels
@@ -70,14 +70,14 @@ class DrivenCoordinates:
         self._loops = kernels.loop_coordinates if layout.n_loop_coordinates else None
         chosen = [layout.velocity_labels[i] for i in layout.independent]
         #: whether the compiled kernel leads the same coordinates
-        self.direct = self._kinematics is not None and list(led) == chosen and set(chosen) <= set(layout.q)
-        wanted = self.system.wanted(dict.fromkeys(led, 0.0), self.led)
+        self.direct = self._kinematics is not None and list(driven) == chosen and set(chosen) <= set(layout.q)
+        wanted = self.system.wanted(dict.fromkeys(driven, 0.0), self.led)
         nothing = WantedValues(lambda q: (np.empty(0), np.empty((0, layout.n_v))), np.empty(0), np.empty(0), [], [])
         self._wanted = nothing if wanted is None else wanted
         self.led_scales, self.wraps = self._wanted.scales, np.array(self._wanted.angles, dtype=bool)
         self._zero = np.zeros(layout.n_v)
         independent = layout.rows if layout.rank else np.empty(0, dtype=np.intp)
-        self._square = np.concatenate([independent, layout.n_c + np.arange(len(led))]).astype(np.intp)
+        self._square = np.concatenate([independent, layout.n_c + np.arange(len(driven))]).astype(np.intp)
 
     # positions
 
@@ -147,8 +147,8 @@ class DrivenCoordinates:
         v = self.scales.q * algebra.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)
         a = self._some_acceleration(t, q, v)
         loops = () if self._loops is None else self._loops(q, v, a, t=t)[2]
-        own = dict(zip((*layout.velocity_labels, *layout.loops), (*a, *loops), strict=True))
-        gap = y2 - np.array([own[name] for name in self.led])
+        rates = dict(zip((*layout.velocity_labels, *layout.loops), (*a, *loops), strict=True))
+        gap = y2 - np.array([rates[name] for name in self.led])
         right = np.concatenate([np.zeros(layout.n_c), gap / self.led_scales])
         a = a + self.scales.q * algebra.lstsq(K, right, rcond=NULL)
         return v, a
@@ -336,8 +336,8 @@ def name_singular(driven: DrivenCoordinates, kind: str, t: float, q: Array, tang
     layout = driven.layout
     free = np.abs(tangent.free)
     moving = tuple(layout.velocity_labels[i] for i in np.flatnonzero(free >= SHARE * free.max()))
-    held = np.abs(tangent.rows[: layout.n_c])
-    labels = [layout.constraint_labels[i] for i in np.flatnonzero(held >= SHARE * np.abs(tangent.rows).max())]
+    rows = np.abs(tangent.rows[: layout.n_c])
+    labels = [layout.constraint_labels[i] for i in np.flatnonzero(rows >= SHARE * np.abs(tangent.rows).max())]
     joints = tuple(dict.fromkeys(label.partition(".")[0] for label in labels))
     values = dict(zip(driven.led, driven.prescribed_values(q, t).tolist(), strict=True))
     return Singular(kind, t, values, q, moving, joints)

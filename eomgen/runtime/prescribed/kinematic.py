@@ -165,7 +165,7 @@ def keep(
     result: Sequence[Singular],
     stop: Singular | None,
     requested: int,
-    led: tuple[str, ...],
+    names: tuple[str, ...],
     *,
     u: Array | None = None,
     header: Mapping[str, Any] | None = None,
@@ -185,10 +185,10 @@ def keep(
     columns = MotionColumns(module, t, x, u, a, passed)
     span = [float(t[0]), float(t[-1])] if t.size else []
     status, message = (0, "the whole range") if stop is None else (-1, f"{len(t)} of {requested} points: {stop}")
-    more = {"led": list(led), "singular": [str(s) for s in result]}
+    more = {"led": list(names), "singular": [str(s) for s in result]}
     known = header_of(module.layout, METHOD, {}, (), residuals(module, t, x), status, message, more, span)
     complete = {**describe(module), **known, **(header or {})}
-    return KinematicAnalysis.of((t, x, columns, complete, *rest), a, list(result), stop, led)
+    return KinematicAnalysis.of((t, x, columns, complete, *rest), a, list(result), stop, names)
 
 
 def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
@@ -211,9 +211,9 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
     y (n_led,) are the values of the driven coordinates, ``near`` (n_q,) a closed position beside it.
     """
     layout, scales = driven.layout, driven.scales
-    system, led = driven.system.at(t), dict(zip(driven.led, y.tolist(), strict=True))
+    system, values = driven.system.at(t), dict(zip(driven.led, y.tolist(), strict=True))
     with np.errstate(all="ignore"):  # coordinates of the tree are held exactly, so that the gap opens at a joint
-        q, _ = close(system.closure(led), system.with_values(near, led))
+        q, _ = close(system.closure(values), system.with_values(near, values))
     position = system.position
     C = position(q)[0]
     if not C.size:
@@ -288,14 +288,14 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
                 t,
                 q,
             )
-    held = list(initial.compatible(q, names, values))[: layout.n_dof - len(names)]
-    if len(names) + len(held) < layout.n_dof:
+    fixed = list(initial.compatible(q, names, values))[: layout.n_dof - len(names)]
+    if len(names) + len(fixed) < layout.n_dof:
         module.layout.require_minimal_form()
         plural = "s" * (layout.n_dof != 1)
         raise ill_chosen(
             f"{layout.n_dof} degree{plural} of freedom, but fewer coordinates can be prescribed at this position"
         )
-    result = (*names, *held)
+    result = (*names, *fixed)
     Q = DrivenCoordinates(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
     if Q < SINGULAR:
         where = place(layout.q, q)[2:]
@@ -391,14 +391,14 @@ def follow_drivers(
 
 def _moved_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
     """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
-    led = Forcing(module.layout, inputs).constrained
-    if led and method == "kinematic":
+    constrained = Forcing(module.layout, inputs).constrained
+    if constrained and method == "kinematic":
         names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
         raise cannot(
             f"method 'kinematic' needs drivers that are expressions of t, but the inputs {names} move {module.name}; "
             "leave method= out to integrate it"
         )
-    return led
+    return constrained
 
 
 def _follow(module: BoundModel, initial: Start, forcing: Forcing, start: float, end: float) -> _Motion:
@@ -422,10 +422,10 @@ def _follow(module: BoundModel, initial: Start, forcing: Forcing, start: float, 
             f"the drivers cannot move further at t = {followed.stop.t:.6g} s of {end:.6g} s: {followed.stop}; {gap}; "
             "change the drivers' values, or the dimensions"
         )
-    own = followed.nodes[followed.nodes < followed.end]
-    if len(own) < FEWEST - 1:
-        own = np.unique(np.concatenate([own, np.linspace(0.0, followed.end, FEWEST)[:-1]]))
-    times = np.append(start + sense * own, end)
+    nodes = followed.nodes[followed.nodes < followed.end]
+    if len(nodes) < FEWEST - 1:
+        nodes = np.unique(np.concatenate([nodes, np.linspace(0.0, followed.end, FEWEST)[:-1]]))
+    times = np.append(start + sense * nodes, end)
     return _Motion(followed, forcing, start, sense, times)
 
 

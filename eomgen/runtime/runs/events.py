@@ -188,8 +188,8 @@ class Events:
     def renewed(self, module: BoundModel, forcing: Forcing, t: float, x: Array, event: int) -> Array:
         """The state x with the new values that the model gives at an event."""
         after, resets, self.last = x.copy(), self.layout.info.resets, f" at event {self.names[event]}"
-        own = [k for k, (index, _) in enumerate(resets) if index == event]
-        after[[resets[k][1] for k in own]] = module.kernels.rows("resets", own, t, after, forcing(t, after))
+        of_event = [k for k, (index, _) in enumerate(resets) if index == event]
+        after[[resets[k][1] for k in of_event]] = module.kernels.rows("resets", of_event, t, after, forcing(t, after))
         return after
 
     def crowded(self, t: float, count: int) -> SimulationError:
@@ -443,7 +443,7 @@ def _by_event(layout: Layout, raw: Any) -> dict[int, list[Controller]]:
         require_time_and_state(f"the controller of {name}", function)
     result: dict[int, list[Controller]] = {}
     for clock in clocks:
-        own = [Controller(n, layout.x.index(n), wanted[n]) for n in clock["open"] if n in wanted]
-        if own:
-            result[int(clock["event"])] = own
+        controllers = [Controller(n, layout.x.index(n), wanted[n]) for n in clock["open"] if n in wanted]
+        if controllers:
+            result[int(clock["event"])] = controllers
     return result

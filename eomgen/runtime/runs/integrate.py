@@ -83,8 +83,8 @@ def choose_solver(method: Any, purpose: str = "simulate") -> Any:
     raise no_choice(f"method must be one of {', '.join(METHODS)}, or a subclass of OdeSolver, not {method!r}")
 
 
-def check_options(solver: Any, options: Collection[str], own: Collection[str]) -> None:
-    """Refuse options that one of SciPy's own methods would only warn about; ``own`` are those of ``simulate``, to
+def check_options(solver: Any, options: Collection[str], known: Collection[str]) -> None:
+    """Refuse options that one of SciPy's own methods would only warn about; ``known`` are those of ``simulate``, to
     suggest.
     """
     from inspect import signature
@@ -93,7 +93,7 @@ def check_options(solver: Any, options: Collection[str], own: Collection[str]) -
         return
     taken = [*signature(solver.__init__).parameters]
     allowed = [name for name in taken if name not in ("self", "fun", "t0", "y0", "t_bound", "extraneous")]
-    check_names(f"option of simulate with {solver.__name__}", options, allowed, own)
+    check_names(f"option of simulate with {solver.__name__}", options, allowed, known)
 
 
 def takes_jacobian(solver: Any) -> bool:

@@ -270,7 +270,7 @@ def solver_class(core: Any, name: str) -> Any:
     Jacobian than the module's, it is SciPy's own; SciPy has no Taylor.  A failed evaluation shortens the step.
     """
     scipy = require("scipy.integrate", "scipy", f"method {name}")
-    own: Any = getattr(scipy, name, _only_for_modules)
+    kind: Any = getattr(scipy, name, _only_for_modules)
     kernel = core.kernel
 
     class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
@@ -284,7 +284,7 @@ def solver_class(core: Any, name: str) -> Any:
                 return super().__new__(cls)
             if callable(jac):
                 options["jac"] = lambda t, x: jac(t, x.copy())
-            return own(lambda t, x: fun(t, x.copy()), *args, **options)  # a function may change what it is given
+            return kind(lambda t, x: fun(t, x.copy()), *args, **options)  # a function may change what it is given
 
         def __init__(
             self,

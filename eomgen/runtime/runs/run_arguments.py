@@ -240,16 +240,16 @@ def set_up(
 
 def longest_step(module: BoundModel, method: Any) -> dict[str, float]:
     """The model's own ``max_step`` (s), which implicit methods do not need; empty without."""
-    own = module.info.simulation.get("max_step")
-    return {} if own is None or (isinstance(method, str) and method in STIFF) else {"max_step": own}
+    declared = module.info.simulation.get("max_step")
+    return {} if declared is None or (isinstance(method, str) and method in STIFF) else {"max_step": declared}
 
 
 def declared_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
     """Method and step of a run: the model's own where it has steps of one size and nothing else is given."""
-    own, named = map(module.info.simulation.get, ("step", "method"))
-    if own is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
+    size, named = map(module.info.simulation.get, ("step", "method"))
+    if size is None or not module.layout.n_dof or not (method is None or (isinstance(method, str) and method == named)):
         return method, step
-    return named, own if step is None else step
+    return named, size if step is None else step
 
 
 def check_method(method: Any, step: Any) -> float | None:
@@ -272,8 +272,8 @@ def steps_of(
         require_steps("step", size, *span)
         options = {**options, "max_step": size, "first_step": size}
     raw = {name: value for name, value in options.items() if value is not None}
-    own = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
-    result = check_tolerances(module.n_x, abs(span[1] - span[0]), own | raw)
+    wanted = {name: declared[name] for name in ("rtol", "atol")} | longest_step(module, method)
+    result = check_tolerances(module.n_x, abs(span[1] - span[0]), wanted | raw)
     require_steps("max_step", float(result.get("max_step", np.inf)), *span)
     return result
 
