@@ -87,9 +87,9 @@ def compile_core(
     if kernels is not None:
         return load(build(equations, target, kernels), {})
     with timed(equations.seconds, "program"):
-        program = build(equations, target, [k.name for k in KERNELS if not k.late])
+        program = build(equations, target, [k.name for k in KERNELS if not k.lazy])
     core = load(program, equations.seconds)
-    lazy = {k.name: str(k.late) for k in KERNELS if k.late and 0 not in k.shape(program.sizes)}
+    lazy = {k.name: str(k.lazy) for k in KERNELS if k.lazy and 0 not in k.shape(program.sizes)}
     return LazyCore(core, list(lazy), load_lazy)
 
 

@@ -47,13 +47,13 @@ class Kernel(NamedTuple):
     shape: Callable[[Sizes], tuple[int, ...]]  #: of the result for one state
     result: str  #: what the result is, one line for headers and documentation
     #: left out of a module made in this process until one of those with the same value is called; never of an export
-    late: bool | str = False
-    absent: bool = False  #: whether models where a size of the result is 0 are without it, as without late ones
+    lazy: bool | str = False
+    absent: bool = False  #: whether models where a size of the result is 0 are without it, as without lazy ones
 
     @property
     def optional(self) -> bool:
         """Whether a model has it only if no size of its result is 0."""
-        return self.absent or bool(self.late)
+        return self.absent or bool(self.lazy)
 
     @property
     def kind(self) -> str:
@@ -94,9 +94,9 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
     Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
     Kernel("inverse_dynamics_derivatives", ("q", "v", "a"), lambda s: (s.n_v, s.n_q + 2 * s.n_v),
-           "M a + h by [q, v, a], each at fixed others; by a it is M", late="inverse dynamics"),
+           "M a + h by [q, v, a], each at fixed others; by a it is M", lazy="inverse dynamics"),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
-    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
+    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, lazy=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
     Kernel("coordinate_slopes", ("q",), lambda s: (s.n_coordinate_slopes, s.n_q),
@@ -114,14 +114,14 @@ KERNELS: tuple[Kernel, ...] = (
         "event_derivatives", ("q", "v"),
         lambda s: ((s.n_events + s.n_resets), s.n_x + 1 + s.n_u + s.n_p) if s.n_events else (0, 0),
         "[events, resets] by [q, v, t, u, p]",
-        late=True,
+        lazy=True,
     ),
     Kernel(
         "strike_derivatives",
         STRIKE,
         lambda s: (s.n_strike, s.n_x + 1 + s.n_u + s.n_p),
         "[M a + C_q^T l - n^T g, a/s^2 + C_q^T l, C_q v + C_t, rates of events, of what is closed] by [q, v, t, u, p]",
-        late=True,
+        lazy=True,
     ),
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
@@ -131,49 +131,49 @@ KERNELS: tuple[Kernel, ...] = (
     ),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_loop_coordinates, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_alignments,), "positive unless an axis of a cut joint is flipped"),
-    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
+    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", lazy=True),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_finite_forces,), "1 where a force element's loads are finite"),
-    Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
+    Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", lazy=True),
     Kernel("parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major",
-           late=True),
+           lazy=True),
     Kernel(
         "assembly_jacobian",
         ("q", "v"),
         lambda s: (s.n_h + s.n_c + 2 * s.n_loop_coordinates, s.n_x + s.n_u + s.n_p),
         "[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]",
-        late=True,
+        lazy=True,
     ),
     Kernel(
         "output_derivatives",
         ("q", "v", "a"),
         lambda s: (s.n_y, s.n_q + 2 * s.n_v + s.n_u + s.n_p),
         "outputs by [q, v, a, u, p], each at fixed others",
-        late=True,
+        lazy=True,
     ),
     Kernel(
         "needed_wrenches",
         ("q", "v", "a"),
         lambda s: (s.n_wrenches,),
         "wrench that joints and constraints exert on each body (6, about its origin), loads of cut joints (6)",
-        late="reactions",
+        lazy="reactions",
     ),
     Kernel(
         "wrench_geometry",
         ("q",),
         lambda s: (s.n_wrench_geometry,),
         "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
-        late="reactions",
+        lazy="reactions",
     ),
-    Kernel("inertial_terms", ("q", "v", "a"), lambda s: ((s.n_wrenches > 0) * s.n_bodies, 22), INERTIAL, late=True),
-    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dL/dv, and their rates -dH/dq + Q", late=True),
-    Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
-    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
+    Kernel("inertial_terms", ("q", "v", "a"), lambda s: ((s.n_wrenches > 0) * s.n_bodies, 22), INERTIAL, lazy=True),
+    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dL/dv, and their rates -dH/dq + Q", lazy=True),
+    Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", lazy=True),
+    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", lazy=True),
     Kernel("meeting_time", ("q", "v", "a"), lambda s: (5,), "s until shapes may meet; depth, thickness, deepest pair"),
     Kernel("near_pairs", ("q",), lambda s: (s.n_witnesses,), "of each contact: how many pairs are near, and where",
-           late="rigid contact"),
+           lazy="rigid contact"),
     Kernel("bias_apart", ("q", "v"), lambda s: (s.n_v if s.n_witnesses else 0,), "h without contacts between groups",
-           late="rigid contact"),
-    Kernel("motion_axes", ("q",), lambda s: (s.n_v if s.n_witnesses else 0, 6), late="rigid contact",
+           lazy="rigid contact"),
+    Kernel("motion_axes", ("q",), lambda s: (s.n_v if s.n_witnesses else 0, 6), lazy="rigid contact",
            result="angular velocity of what a velocity moves, and velocity of its point at the origin, ground axes"),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )  # fmt: skip

@@ -102,7 +102,7 @@ def emit_c(program: Program, precision: str | None = None, lanes: bool = True, s
 
 def _of_analyses(program: Program) -> frozenset[str]:
     """Names of the blocks that only kernels need which runs do without: those that a session leaves for later."""
-    lazy = {k.name for k in KERNELS if k.late}
+    lazy = {k.name for k in KERNELS if k.lazy}
     first = [k.name for k in program.kernels if k.name not in lazy]
     if "rhs" not in first:  # a module for analyses
         return frozenset()

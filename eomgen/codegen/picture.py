@@ -14,16 +14,16 @@ import numpy as np
 
 from ..elements.forces.force import Force
 from ..elements.frames import Frame, Marker, WrapCylinder
-from ..elements.looks import (
+from ..elements.glyphs import (
     ARROW,
     ROUND_ARROW,
     Contour,
     Drawn,
+    Glyph,
     LiftCurve,
     PitchCircles,
     Pull,
     RackAndPinion,
-    Seen,
     Wheel,
 )
 from ..errors import UsageError
@@ -119,9 +119,9 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
     n = _Numbers(mechanism)
     joints = [_joint(n, spec) for spec in mechanism.joints]
     owners = {name: k for k, spec in enumerate(mechanism.joints) for name in spec.coordinates}
-    things = [(f.name, f.drawn(), _push(n, f)) for f in mechanism.forces]
+    things = [(f.name, f.glyphs(), _push(n, f)) for f in mechanism.forces]
     switched = [s.constraint for s in mechanism.switched if s.constraint is not None]
-    things += [(c.name, c.drawn(), {}) for c in (*mechanism.constraints, *switched)]
+    things += [(c.name, c.glyphs(), {}) for c in (*mechanism.constraints, *switched)]
     elements = [
         {"name": name, **result, **(push if len(result.get("stops", ())) > 1 else {})}
         for name, every, push in things
@@ -180,7 +180,7 @@ def _push(n: _Numbers, force: Force) -> dict[str, Any]:
     return {} if result is None else {"point": [*result, 0.0, 0.0]}
 
 
-def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, Any] | None:
+def _element(n: _Numbers, seen: Glyph, owners: Mapping[str, int]) -> dict[str, Any] | None:
     """One thing to be seen; None where it depends on more than parameters."""
     if isinstance(seen, Drawn):
         stops = [_stop(n, stop) for stop in seen.stops]

@@ -24,7 +24,7 @@ from ..elements.forces.friction import (
 )
 from ..elements.forces.normal_laws import CURVED_LAWS, IMPACT, HertzBodies, NormalLaw, RigidLaw, normal_key
 from ..elements.frames import Frame, Marker
-from ..elements.looks import Seen
+from ..elements.glyphs import Glyph
 from ..expr.core import Expr, Graph
 from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, MEETINGS, PairLaw, class_of, pair_kind, pair_states
@@ -84,8 +84,8 @@ class ContactGroups(Force):
     def laws(self) -> tuple[Any, ...]:
         return (self.normal_law,) if self.friction is None else (self.normal_law, self.friction)
 
-    def drawn(self) -> list[Seen]:
-        return [seen for shape in (*self.first, *self.second) for seen in shape.drawn()]
+    def glyphs(self) -> list[Glyph]:
+        return [seen for shape in (*self.first, *self.second) for seen in shape.glyphs()]
 
     def loads(self, view: View) -> list[Load]:
         return self._loads(view, "")

@@ -21,8 +21,8 @@ from ..elements.forces.normal_laws import (
     normal_key,
 )
 from ..elements.frames import Marker, velocity_at
+from ..elements.glyphs import PLANE, Drawn, Glyph, Wheel
 from ..elements.kinds import Fields, Pair, Radii, Scalar
-from ..elements.looks import PLANE, Drawn, Seen, Wheel
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.vectors import Vec3
@@ -176,8 +176,8 @@ class SpherePlane(Contact):
 
     radius: Expr
 
-    def drawn(self) -> list[Seen]:
-        ground: list[Seen] = [Drawn((self.first,), about=PLANE)]
+    def glyphs(self) -> list[Glyph]:
+        ground: list[Glyph] = [Drawn((self.first,), about=PLANE)]
         return ground if self.radius.is_zero else [*ground, Wheel(self.second, self.radius)]
 
     def touch(self, view: View) -> Touch:
@@ -193,7 +193,7 @@ class SphereSphere(Contact):
 
     radii: tuple[Expr, Expr]
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Wheel(self.first, self.radii[0]), Wheel(self.second, self.radii[1])]
 
     def touch(self, view: View) -> Touch:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.frames import Frame, Marker
-from ..elements.looks import PLANE, Drawn, Seen, Wheel
+from ..elements.glyphs import PLANE, Drawn, Glyph, Wheel
 from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.records import Record
@@ -107,9 +107,9 @@ class ContactShape(Record):
         """Its parts."""
         return SHAPES[self.kind].features(self)
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         """What is to be seen of it."""
-        return SHAPES[self.kind].drawn(self)
+        return SHAPES[self.kind].glyphs(self)
 
     def parts(self) -> ShapeParts:
         """How many parts of each class it has."""
@@ -170,9 +170,9 @@ def _ellipsoid(shape: ContactShape) -> list[Feature]:
     return [Feature("ellipsoid", shape.marker.frame, sizes, greatest(sizes), 2.0 * _least(sizes))]
 
 
-def _ellipses(shape: ContactShape) -> list[Seen]:
+def _ellipses(shape: ContactShape) -> list[Glyph]:
     """The outlines of an ellipsoid in the planes of two of its axes."""
-    result = list[Seen]()
+    result = list[Glyph]()
     for i, j in ((0, 1), (1, 2), (2, 0)):
         places = []
         for k in range(_STEPS + 1):
@@ -193,13 +193,13 @@ def _cuboid(shape: ContactShape) -> list[Feature]:
     ]
 
 
-def _cuboid_edges(shape: ContactShape) -> list[Seen]:
+def _cuboid_edges(shape: ContactShape) -> list[Glyph]:
     corners = [feature.frame for feature in shape.features() if feature.kind == "end"]
     ways = ((0, 1, 3, 2, 0, 4, 5, 7, 6, 4), (1, 5), (2, 6), (3, 7))
     return [shape.line([corners[k] for k in way]) for way in ways]
 
 
-def _field_lines(shape: ContactShape) -> list[Seen]:
+def _field_lines(shape: ContactShape) -> list[Glyph]:
     frame = shape.marker.frame
     lines = [shape.line([_moved(frame, place) for place in line]) for line in field_lines(shape.sizes[0])]
     return [*lines] or [Drawn((shape.marker,), about=PLANE)]
@@ -233,7 +233,7 @@ def _cells(shape: ContactShape) -> list[Feature]:
     return [Feature(BED_CELL, place, (size,), length.graph.zero, size, k) for k, place in enumerate(places)]
 
 
-def _strip(shape: ContactShape) -> list[Seen]:
+def _strip(shape: ContactShape) -> list[Glyph]:
     """A plate, about its marker, or a bed, from its marker on."""
     length = shape.sizes[0]
     half = 0.5 * length
@@ -271,7 +271,7 @@ def _polygon(shape: ContactShape) -> list[Feature]:
     return [Feature(POLYGON, frame, tuple(edges), sqrt(reach), thick, number=len(corners)), *points]
 
 
-def _corners(shape: ContactShape) -> list[Seen]:
+def _corners(shape: ContactShape) -> list[Glyph]:
     """A line from corner to corner, closed where it goes around."""
     frames = [feature.frame for feature in shape.features() if feature.kind in ("corner", "end", "vertex")]
     return [shape.line(frames if SHAPES[shape.kind].features is _rod else [*frames, frames[0]])]
@@ -333,7 +333,7 @@ def _pieces(shape: ContactShape) -> list[Feature]:
     return result
 
 
-def _outline(shape: ContactShape) -> list[Seen]:
+def _outline(shape: ContactShape) -> list[Glyph]:
     frame, zero, points = shape.marker.frame, shape.sizes[0].graph.zero, _points(shape)
     places = [_moved(frame, (x, y, zero)) for x, y in (points if shape.kind in GROUNDS else [*points, points[0]])]
     if shape.kind in ("smooth_profile", "smooth_outline"):
@@ -346,7 +346,7 @@ class ShapeType(NamedTuple):
     """A kind of shape: its features, its picture, and which feature it is where it is the first of a pair."""
 
     features: Callable[[ContactShape], list[Feature]]
-    drawn: Callable[[ContactShape], list[Seen]]
+    glyphs: Callable[[ContactShape], list[Glyph]]
     first: str = ""
 
 

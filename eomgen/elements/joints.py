@@ -18,8 +18,8 @@ from . import kinds
 from .constraints.constraint import SWITCHING
 from .dimensions import ENERGY, LENGTH, REACH, TIME
 from .element_type import Element, ElementType, key, keys_of, table
+from .glyphs import JointLook, SymbolPart
 from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
-from .looks import JointLook, SymbolPart
 from .rotations import euler_parameters_from_matrix
 from .scalars import AXES, elementary
 

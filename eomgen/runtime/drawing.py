@@ -329,7 +329,7 @@ def _calls(module: BoundModel) -> str:
     """Signatures of the calls that can be made, folded up."""
     rows = []
     for kernel in KERNELS:
-        if kernel.late or kernel.name not in module.core.names:
+        if kernel.lazy or kernel.name not in module.core.names:
             continue
         if (getattr(type(module), kernel.name, None) or getattr(module, kernel.name, None)) is None:
             continue

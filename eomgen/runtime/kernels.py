@@ -38,7 +38,7 @@ class LazyCore:
     Most runs need few of the kernels, and compiling those of the analyses as well would make every start slower.  An
     exported package has them all from the beginning.
 
-    ``load(group)`` makes the core of the ``late`` kernels that have :attr:`~..base.kernel_table.Kernel.late` in common;
+    ``load(group)`` makes the core of the ``lazy`` kernels that have :attr:`~..base.kernel_table.Kernel.lazy` in common;
     ``further`` holds those made so far.
     """
 
@@ -51,7 +51,7 @@ class LazyCore:
 
     def having(self, name: str) -> Core:
         """The core with a rarer kernel, made now if there is none yet."""
-        group = str(NAMED[name].late)
+        group = str(NAMED[name].lazy)
         if group not in self.further:
             self.further[group] = self.load(group)
         return self.further[group]
@@ -595,7 +595,7 @@ def restore(kind: type[Any], name: str, file: str, p: Array, u: dict[str, float]
 
     def load(group: str) -> Any:
         if group not in made:
-            rare = ", ".join(name for name in names if name not in core.names and str(NAMED[name].late) == group)
+            rare = ", ".join(name for name in names if name not in core.names and str(NAMED[name].lazy) == group)
             raise cannot(f"the module was pickled without {rare}; call one of them before you pickle it")
         return find_core(*made[group])
 

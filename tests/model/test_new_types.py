@@ -20,9 +20,9 @@ from eomgen.elements.forces import FORCES
 from eomgen.elements.forces.force import View
 from eomgen.elements.forces.paths import LINE, PathForce
 from eomgen.elements.frames import Marker
+from eomgen.elements.glyphs import COIL, CROSS, SPIRAL, Drawn, Glyph, JointLook, SymbolPart
 from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint, joint
 from eomgen.elements.kinds import MarkerReference, Scalar
-from eomgen.elements.looks import COIL, CROSS, SPIRAL, Drawn, JointLook, Seen, SymbolPart
 from eomgen.expr import vectors as vec
 from eomgen.expr.core import Expr, Graph
 from eomgen.expr.vectors import Mat3, Vec3
@@ -55,8 +55,8 @@ class HardeningSpring(PathForce):
         s, _ = self.path.measure(view)
         return self.share * (0.5 * self.stiffness * s**2 + 0.25 * self.hardening * s**4)
 
-    def drawn(self) -> list[Seen]:
-        return [self.path.drawn(COIL, SPIRAL)]
+    def glyphs(self) -> list[Glyph]:
+        return [self.path.glyphs(COIL, SPIRAL)]
 
 
 class Slanted(Joint):
@@ -92,7 +92,7 @@ class Level(Constraint):
     marker: Marker = key(MarkerReference("marker that stays at the height", required=True))
     height: Expr = key(Scalar("height (m)", default=0, dimension=LENGTH))
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Drawn((self.marker,), about=CROSS)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:

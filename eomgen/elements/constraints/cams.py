@@ -16,8 +16,8 @@ from ...expr.records import Record
 from ..dimensions import LENGTH, NONE, REACH
 from ..element_type import ElementType, Entry, table
 from ..frames import Frame, Marker
+from ..glyphs import Contour, Glyph, LiftCurve, Wheel
 from ..kinds import Choice, Flag, JointReference, Latex, MarkerReference, Name, Scalar
-from ..looks import Contour, LiftCurve, Seen, Wheel
 from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 
 # -- laws of lift ------------------------------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ class CamLift(Constraint):
     phase: Expr
     kind: str
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [LiftCurve(self.cam, self.follower, self.lift.expression, self.lift.local, self.phase)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
@@ -132,7 +132,7 @@ class KnifeContact(Constraint):
     follower: Marker
     contour: Profile
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [_polar(self.cam, self.contour, self.follower)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
@@ -154,7 +154,7 @@ class FlatSupport(Constraint):
     follower: Marker
     support: Profile
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         """The envelope of the tangents: h n + h' t."""
         a, h = self.support.local, self.support.expression
         slope = self.support.slope(a)
@@ -182,7 +182,7 @@ class _Contact(Constraint):
     point: Marker
     angle: Expr
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [_polar(self.cam, self.contour, self.follower)]
 
     def polar(self, view: ConstraintView) -> tuple[Expr, Expr, Frame]:
@@ -205,8 +205,8 @@ class RollerContact(_Contact):
     type_name = "cam_roller"
     radius: Expr
 
-    def drawn(self) -> list[Seen]:
-        return [*super().drawn(), Wheel(self.follower, self.radius)]
+    def glyphs(self) -> list[Glyph]:
+        return [*super().glyphs(), Wheel(self.follower, self.radius)]
 
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.position[0], follower.position[1]
@@ -230,7 +230,7 @@ class FlatContact(_Contact):
 
     type_name = "cam_flat_face"
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [_polar(self.cam, self.contour, self.follower, face=True)]
 
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:

@@ -15,8 +15,8 @@ from ...expr.differentiate import gradient
 from ..dimensions import SPIN
 from ..element_type import Element, ElementType, Entry, Meaning
 from ..frames import Frame, Marker, MotionView
+from ..glyphs import Glyph
 from ..kinds import LAW, OUTPUT, Factors, Fields, Flag, Scalar, SomeNames
-from ..looks import Seen
 
 POSITION, VELOCITY = "position", "velocity"
 
@@ -58,7 +58,7 @@ class Constraint(Element):
     def conditions(self, view: ConstraintView) -> list[Condition]:
         """The equations this element adds."""
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         """What is to be seen of it in a picture; nothing unless a type says so."""
         return []
 

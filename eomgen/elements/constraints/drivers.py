@@ -14,8 +14,8 @@ from ...expr.vectors import Vec3
 from ..dimensions import REACH
 from ..element_type import ElementType, Entry, table
 from ..frames import Marker
+from ..glyphs import ROUND_ARROW, Drawn, Glyph
 from ..kinds import MOTION, Axis, JointReference, MarkerReference, Pair, Scalar
-from ..looks import ROUND_ARROW, Drawn, Seen
 from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 
 #: Kinds of tables whose second derivative jumps between points.
@@ -45,7 +45,7 @@ class CoordinateDriver(Driver):
     coordinate: Expr
     kind: str
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         name = self.coordinate.node
         return [Drawn((), str(name[1]), about=ROUND_ARROW)] if name[0] == "sym" else []
 

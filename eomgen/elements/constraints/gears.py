@@ -10,8 +10,8 @@ from ...base.value_rules import WHEELS as WHEELS_FIT
 from ...expr.core import Expr, sin
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, Found, Where, element, key
+from ..glyphs import Glyph, PitchCircles, RackAndPinion
 from ..kinds import Fields, Flag, JointPair, JointReference, Scalar, Two, Wheels
-from ..looks import PitchCircles, RackAndPinion, Seen
 from .constraint import Condition, Constraint, ConstraintView, switchable
 
 
@@ -37,7 +37,7 @@ class Gear(Pair):
     Norton, Design of Machinery, eq. 9.1).
     """
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [PitchCircles(self.a, self.b, self.ratio)]
 
 
@@ -49,7 +49,7 @@ class Belt(Pair):
 
     radius: Expr | None = None  #: of the first pulley, for its picture; None where teeth are given
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [PitchCircles(self.a, self.b, self.ratio, belt=True, radius=self.radius)]
 
 
@@ -64,7 +64,7 @@ class Rack(Constraint):
     radius: Expr = key(Scalar("radius (m); negative if the rack moves the other way", required=True, dimension=LENGTH))
     offset: Expr = key(Scalar("travel of the rack at which the pinion's angle is 0 (m)", default=0, dimension=LENGTH))
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [RackAndPinion(self.pinion, self.rack, self.radius)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
@@ -161,8 +161,8 @@ class Planetary(Constraint):
     planet_radius: Expr | None
     phase: Expr
 
-    def drawn(self) -> list[Seen]:
-        (r_s, r_r, r_p), result = self._radii(), list[Seen]()
+    def glyphs(self) -> list[Glyph]:
+        (r_s, r_r, r_p), result = self._radii(), list[Glyph]()
         if self.planet is None or r_p is None:
             return []
         if r_s is not None:

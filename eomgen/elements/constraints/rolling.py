@@ -14,8 +14,8 @@ from ...expr.vectors import Vec3
 from ..dimensions import LENGTH, NONE
 from ..element_type import ElementType, Entry, element, key
 from ..frames import Marker, velocity_at
+from ..glyphs import Contour, Glyph, Wheel
 from ..kinds import Axis, Choice, Flag, MarkerReference, Scalar, Vector
-from ..looks import Contour, Seen, Wheel
 from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies, switchable
 
 # -- supports ----------------------------------------------------------------------------------------------------------
@@ -82,7 +82,7 @@ class Wheeled(Rolling):
 
     radius: Expr
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Wheel(self.wheel, self.radius)]
 
 
@@ -195,7 +195,7 @@ class RollingConvex(Rolling):
     def contact(self, view: ConstraintView) -> Vec3:
         return vec.times(view.rotation(self.wheel), self._touching(self._down(view))[1])
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         """Where planes that contain two of its axes touch it."""
         graph = self.support.graph
         angle = graph.symbol(f"normal of {self.name}")

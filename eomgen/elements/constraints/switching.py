@@ -8,8 +8,8 @@ from ...expr import vectors as vec
 from ...expr.core import Expr
 from ..element_type import ElementType, Entry, Where, element, key
 from ..frames import Marker, velocity_at
+from ..glyphs import CROSS, Drawn, Glyph
 from ..kinds import Choice, JointReference, Pair
-from ..looks import CROSS, Drawn, Seen
 from .constraint import VELOCITY, Condition, Constraint, ConstraintView, is_switched, on_two_bodies, switchable
 
 AXES = ("xyz", "xy", "x", "y", "z", "xz", "yz")
@@ -32,7 +32,7 @@ class Hold(Constraint):
         Choice("axes of the first marker about which the second does not turn", default="none", choices=("none", *AXES))
     )
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Drawn((self.marker,), about=CROSS)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:

@@ -13,7 +13,7 @@ from ...expr.core import Expr, Graph
 from ...expr.vectors import Vec3
 from ..element_type import Element
 from ..frames import Marker, MotionView
-from ..looks import Seen
+from ..glyphs import Glyph
 
 # -- one-sided laws ----------------------------------------------------------------------------------------------------
 
@@ -123,7 +123,7 @@ class Force(Element):
         """Potential energy (J) of the element's conservative part, None if it has none."""
         return None
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         """What is to be seen of it in a picture; nothing unless a type says so."""
         return []
 

@@ -10,8 +10,8 @@ from ...expr.core import Expr, sin, sqrt
 from ...expr.records import Record
 from ..dimensions import FORCE, LENGTH, NONE, SPEED, TIME
 from ..element_type import Entry, element, key, table
+from ..glyphs import Glyph
 from ..kinds import LAW, Scalar
-from ..looks import Seen
 from .force import View
 from .paths import LINE, Path, PathForce, read_path
 
@@ -121,8 +121,8 @@ class Muscle(PathForce):
         active = self.activation * active_force_length(l) * force_velocity(v)
         return self.force_max * (active + passive_force_length(l) + self.damping * v) * tilt
 
-    def drawn(self) -> list[Seen]:
-        return [self.path.drawn()]
+    def glyphs(self) -> list[Glyph]:
+        return [self.path.glyphs()]
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return -self.tension(value, rate)

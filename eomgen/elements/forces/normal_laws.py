@@ -11,8 +11,8 @@ from ...expr.core import Expr, sqrt
 from ...expr.records import Record
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, PUSH, RATE, REACH, STIFFNESS
 from ..element_type import ElementType, Entry, Law, Types, element, key, table
+from ..glyphs import STOP, Glyph
 from ..kinds import EXPONENT, Choice, Fields, Radii, Scalar
-from ..looks import STOP, Seen
 from .force import Load, View, beyond_zero, map_law, where
 from .paths import COORDINATE, PathForce
 
@@ -357,9 +357,9 @@ class JointStop(PathForce):
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self._sum(value, rate, lambda depth, change, sense: sense * self.law.force(depth, change))
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         ends = tuple(x for x in (self.lower, self.upper) if x is not None)
-        return [self.path.drawn((), STOP)._replace(walls=ends)]
+        return [self.path.glyphs((), STOP)._replace(walls=ends)]
 
     def potential(self, view: View) -> Expr | None:
         return self._sum(*self.path.measure(view), lambda depth, change, sense: self.law.energy(depth))

@@ -12,8 +12,8 @@ from ...expr.records import Record
 from ...expr.vectors import Vec3
 from ..element_type import Entry, Where
 from ..frames import Marker, WrapCylinder
+from ..glyphs import Drawn, Points
 from ..kinds import JointReference, Pair, Via
-from ..looks import Drawn, Points
 from .force import CoordinateLoad, Force, Load, MarkerLoad, View, power_of, where
 
 # -- paths -------------------------------------------------------------------------------------------------------------
@@ -36,7 +36,7 @@ class Path(Record, ABC):
         return True
 
     @abstractmethod
-    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+    def glyphs(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
         """Where an element on it is seen: with lines along it where it has a length, about it where it is an angle."""
 
     @abstractmethod
@@ -59,7 +59,7 @@ class Line(Path):
         length = sqrt(vec.dot(d, d))
         return (d[0] / length, d[1] / length, d[2] / length), length
 
-    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+    def glyphs(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
         return Drawn((self.start, self.end), along=along)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
@@ -86,7 +86,7 @@ class Turn(Path):
     start: Marker
     end: Marker
 
-    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+    def glyphs(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
         return Drawn((self.start,), about=about)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
@@ -108,7 +108,7 @@ class JointCoordinate(Path):
 
     name: str
 
-    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+    def glyphs(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
         return Drawn((), self.name, along, about)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
@@ -196,7 +196,7 @@ class Route(Path):
     end: Marker
     via: tuple[Marker | WrapCylinder, ...]
 
-    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+    def glyphs(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
         return Drawn((self.start, *self.via, self.end))
 
     def measure(self, view: View) -> tuple[Expr, Expr]:

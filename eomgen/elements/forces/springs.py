@@ -14,8 +14,7 @@ from ...expr.vectors import Mat3, Vec3
 from ..dimensions import DAMPING, ENERGY, FORCE, LENGTH, NONE, PUSH, RATE, REACH, SPIN, STIFFNESS, TIME, Dimension
 from ..element_type import ElementType, Entry, Where, element, key, keys_of, table
 from ..frames import Frame, Marker
-from ..kinds import LAW, BodyName, Choice, Fields, MarkerReference, Matrix6, Scalar, Value, Vector
-from ..looks import (
+from ..glyphs import (
     COIL,
     CYLINDER,
     DASHPOT,
@@ -26,9 +25,10 @@ from ..looks import (
     SPIRAL,
     TURNING_DASHPOT,
     Drawn,
+    Glyph,
     Pull,
-    Seen,
 )
+from ..kinds import LAW, BodyName, Choice, Fields, MarkerReference, Matrix6, Scalar, Value, Vector
 from ..scalars import dot
 from .force import Force, Load, MarkerLoad, View
 from .paths import (
@@ -65,8 +65,8 @@ class Actuator(PathForce):
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self.value
 
-    def drawn(self) -> list[Seen]:
-        seen = self.path.drawn(CYLINDER, ROUND_ARROW)
+    def glyphs(self) -> list[Glyph]:
+        seen = self.path.glyphs(CYLINDER, ROUND_ARROW)
         return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
 
 
@@ -89,7 +89,7 @@ class PointForce(Force):
         none = vec.zero(view.graph)
         return [MarkerLoad(self.marker, *((none, vector) if self.turns else (vector, none)))]
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Pull(self.marker, self.value, self.axes == "body", self.turns)]
 
 
@@ -173,8 +173,8 @@ class Spring(PathForce):
     def push(self, value: Expr, rate: Expr) -> Expr:
         return -self.stiffness * (value - self.rest)
 
-    def drawn(self) -> list[Seen]:
-        return [self.path.drawn(COIL, SPIRAL)]
+    def glyphs(self) -> list[Glyph]:
+        return [self.path.glyphs(COIL, SPIRAL)]
 
     def potential(self, view: View) -> Expr | None:
         if not self.path.is_exact(view):
@@ -200,8 +200,8 @@ class Damper(PathForce):
     def push(self, value: Expr, rate: Expr) -> Expr:
         return -self.damping * rate
 
-    def drawn(self) -> list[Seen]:
-        return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]
+    def glyphs(self) -> list[Glyph]:
+        return [self.path.glyphs(DASHPOT, TURNING_DASHPOT)]
 
 
 _TURNING_STIFFNESS = keys_of(Spring)["stiffness"].replace(dimension=ENERGY)
@@ -266,8 +266,8 @@ class GeneralElement(PathForce):
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self._at(value, rate, self.law - gradient(self.energy, [self.value])[0])
 
-    def drawn(self) -> list[Seen]:
-        seen = self.path.drawn(LAW_BOX, LAW_RING)
+    def glyphs(self) -> list[Glyph]:
+        seen = self.path.glyphs(LAW_BOX, LAW_RING)
         return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
 
     def potential(self, view: View) -> Expr | None:
@@ -376,7 +376,7 @@ class Bushing(Force):
         )
     )  # fmt: skip
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Drawn((self.first, self.second), along=RUBBER)]
 
     def loads(self, view: View) -> list[Load]:

@@ -16,8 +16,8 @@ from ...expr.vectors import Vec3
 from ..dimensions import DAMPING, FORCE, LENGTH, NONE, SPEED, STIFFNESS, TIME
 from ..element_type import Entry, Where, element, key, keys_of, table
 from ..frames import Marker, velocity_at
+from ..glyphs import PLANE, Drawn, Glyph, Wheel
 from ..kinds import LAW, Axis, Choice, Flag, Pair, Radii, Scalar
-from ..looks import PLANE, Drawn, Seen, Wheel
 from .force import Force, Load, MarkerLoad, Measured, View, beyond_zero, where
 from .normal_laws import DampedLinear
 
@@ -447,7 +447,7 @@ class Tyre(Force):
     def acts_along(self) -> bool:
         return True
 
-    def drawn(self) -> list[Seen]:
+    def glyphs(self) -> list[Glyph]:
         return [Drawn((self.road,), about=PLANE), Wheel(self.wheel, self.radius)]
 
     def measured(self, view: View) -> Measured:

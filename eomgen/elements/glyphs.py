@@ -2,7 +2,7 @@
 
 A symbol is about a fortieth of the picture, so that a joint looks the same in a watch and in a crane.  Types of joints
 have a :class:`JointLook` in the axes of their markers (z is the axis); force elements and constraints answer
-``drawn()`` with what of themselves is to be seen.
+``glyphs()`` with what of themselves is to be seen.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class LiftCurve(NamedTuple):
     phase: Expr
 
 
-Seen = Drawn | Pull | Wheel | PitchCircles | Contour | RackAndPinion | LiftCurve
+Glyph = Drawn | Pull | Wheel | PitchCircles | Contour | RackAndPinion | LiftCurve
 
 
 def _arc(radius: float, start: float, end: float, steps: int) -> Points:
