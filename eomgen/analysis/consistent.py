@@ -19,7 +19,7 @@ from ..base.assembly import ClosureSystem, close, closed
 from ..base.limits.constraints import ACCEPTED
 from ..base.limits.constraints import STATE as RANK
 from ..base.scales import largest, least
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import ProjectionError, UsageError, cannot, ill_typed, off_range
 from ..runtime.argument_checks import check_names, read_names, read_number, read_state
 from ..runtime.kernels import constraint_system
@@ -91,7 +91,7 @@ def consistent(
     if isinstance(weights, Mapping):
         weights = {name: read_number(f"weights: that of {name}", weight) for name, weight in weights.items()}
     elif weights is not None and not (isinstance(weights, str) and weights == "mass"):
-        raise ill_typed(f"weights must be a mapping of names to weights, or 'mass', not {shown(weights)}")
+        raise ill_typed(f"weights must be a mapping of names to weights, or 'mass', not {quote(weights)}")
     _check_names(layout, weights, fixed)
     if not layout.n_c:
         return np.asarray(module.project(state, t=t))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import ill_typed, incomplete, off_range
 from ..runtime.argument_checks import check_names, read_numbers, unknown
 from ..runtime.storage import split_head
@@ -119,7 +119,7 @@ def _columns(data: Any, where: str, module: BoundModel, problems: list[str]) -> 
     elif isinstance(data, Mapping):
         raw = {str(name): values for name, values in data.items()}
     else:
-        problems.append(f"{where} must be a trajectory, a table or a mapping of names to values, not {shown(data)}")
+        problems.append(f"{where} must be a trajectory, a table or a mapping of names to values, not {quote(data)}")
         return None
     heads = {name: split_head(name) for name in raw}
     units = {heads[name][0]: unit or units.get(name) for name, (_, unit) in heads.items()}

@@ -14,7 +14,7 @@ from ..base.limits.constraints import EXACT, UNMOVED
 from ..base.limits.positions import ALIGNED
 from ..base.results import Result, plain, same_keys
 from ..base.scales import largest
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import (
     PartitionError,
     ill_shaped,
@@ -87,7 +87,7 @@ def _column(name: str, value: Any) -> Array:
     array = read_numbers(name, value)
     require_size(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
-        raise no_number(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
+        raise no_number(f"{name} must be a finite number, or an array (n,) of them, not {quote(value)}")
     return array
 
 
@@ -386,7 +386,7 @@ def _follow_both_ways(
     if within is not None:
         bounds = read_numbers("within", within)
         if bounds.shape != (2,):
-            raise ill_typed(f"within must be (lowest, highest), not {shown(within)}")
+            raise ill_typed(f"within must be (lowest, highest), not {quote(within)}")
         low, high = bounds.tolist()
     if not low <= here <= high:
         raise off_range(f"{name} is {here:.6g} at the start, which is not within {low:.6g} .. {high:.6g}")

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Unpack
 
 from ..base.files import as_name, example_files, find_example
-from ..base.texts import hint, shown
+from ..base.texts import hint, quote
 from ..base.value_rules import CHECKS, word_of_check
 from ..errors import ModelError, at_odds, bad_file, no_choice, no_such
 from ..model import describe_yaml_file
@@ -111,7 +111,7 @@ def load_example(name: str, **options: Unpack[LoadOptions]) -> Model:
     if file is None:
         models = [key for key in result if not key.endswith(".py")]
         near = hint(str(name), models, quoted=False) or f"there are: {', '.join(models)}"
-        raise no_such(f"no example {shown(name)}; {near}")
+        raise no_such(f"no example {quote(name)}; {near}")
     if file.suffix == ".py":
         raise bad_file(f"{name} is a script, not a model; copy it by 'eomgen examples {name}' and run it")
     return load(file, **options)

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 from weakref import WeakValueDictionary
 
 from ..errors import UsageError, bad_file, ill_typed
-from .texts import shown
+from .texts import quote
 
 # -- names -------------------------------------------------------------------------------------------------------------
 
@@ -38,7 +38,7 @@ def as_name(what: str, raw: Any) -> str:
     """The same as text, as it was written."""
     name = usable_name(raw)
     if name is None:
-        raise ill_typed(f"{what} must be the name of a file or folder, as text or Path, not {shown(raw)}")
+        raise ill_typed(f"{what} must be the name of a file or folder, as text or Path, not {quote(raw)}")
     return name
 
 

@@ -56,7 +56,7 @@ def html_table(title: str, facts: Iterable[tuple[str, str]], doc: str = "") -> s
     return f"<b>{html_text(title)}</b>{f'<p>{html_text(doc)}</p>' if doc else ''}<table>{rows}</table>"
 
 
-def shown(raw: Any) -> str:
+def quote(raw: Any) -> str:
     """What was given, in one line of a message."""
     try:
         text = " ".join(repr(raw).split())

@@ -35,7 +35,7 @@ from .limits.numbers import (
     TRIANGLE,
     ZERO,
 )
-from .texts import shown
+from .texts import quote
 
 # -- one number in a range ---------------------------------------------------------------------------------------------
 
@@ -88,7 +88,7 @@ def read_count(what: str, raw: Any, least: int = 0, most: int | None = None) -> 
     if result is None or result < least or result > (MOST if most is None else most):
         endless = most is None and (result is None or result < least)
         limits = f"of at least {least}" if endless else f"from {least} to {MOST if most is None else most}"
-        raise off_range(f"{what} must be a whole number {limits}, not {shown(raw)}")
+        raise off_range(f"{what} must be a whole number {limits}, not {quote(raw)}")
     return result
 
 

@@ -20,7 +20,7 @@ EXPONENT = 10_000  #: of a number that SymPy may work out
 NO_TEXT = "<unprintable "
 
 
-def shown(value: Any) -> str:
+def printed(value: Any) -> str:
     """The text of a value, whole."""
     return _text(value, str if _prints(value) else None)
 
@@ -36,13 +36,13 @@ def _text(value: Any, write: Callable[[Any], str] | None) -> str:
 
 def shortened(value: Any, longest: int = LONGEST) -> str:
     """The text of a value, cut where it is long."""
-    return texts.shortened(shown(value), longest)
+    return texts.shortened(printed(value), longest)
 
 
 def quoted(value: Any, longest: int = LONGEST) -> str:
     """The value as Python writes it, cut where it is long."""
     plain = isinstance(value, str | int | float | list | tuple | dict)
-    return texts.shortened(_text(value, repr) if plain else shown(value), longest)
+    return texts.shortened(_text(value, repr) if plain else printed(value), longest)
 
 
 def _prints(value: Any) -> bool:

@@ -16,7 +16,7 @@ from ..elements.dimensions import NONE
 from ..elements.element_type import Entry
 from ..elements.kinds import LAW, MOTION, OUTPUT, Fields
 from ..expr.core import LEAVES, Expr, is_comparison, reachable, substitute, symbols_of
-from ..expr.texts import quoted, shown
+from ..expr.texts import printed, quoted
 from .checks import check_keys
 from .description import DescribedEntry, items
 from .fields import EVENT, INPUT, OUTPUT_FIELDS, PARAMETER, STATE
@@ -273,7 +273,7 @@ def _reset(reader: Reader, path: str, raw: Any) -> tuple[tuple[str, Expr], ...]:
             result.append((str(name), instant(reader, f"{path}.{name}", value)))
         else:
             states = bool(reader.description.sections["states"])
-            remedy = nearest(shown(name), known, f"coordinates and velocities{' and states' * states}")
+            remedy = nearest(printed(name), known, f"coordinates and velocities{' and states' * states}")
             reader.fault(
                 f"{path}.{name}", f"no coordinate or velocity{' or state' * states} {name!r}", remedy, "EG-NAME-UNKNOWN"
             )

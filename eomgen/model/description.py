@@ -18,7 +18,7 @@ from ..elements.kinds import Fields, Table
 from ..elements.kinds import is_zero as is_zero
 from ..elements.kinds import items as items
 from ..errors import Problem, cannot
-from ..expr.texts import NO_TEXT, shortened, shown
+from ..expr.texts import NO_TEXT, printed, shortened
 
 GROUND_NAME = "ground"
 
@@ -283,7 +283,7 @@ def text_of(value: Any) -> str:
     listed = items(value)
     if listed is not None:
         return "(" + ", ".join(text_of(x) for x in listed) + ")"
-    return shown(value)
+    return printed(value)
 
 
 def label_of(reference: Mapping[str, Any]) -> str:
@@ -300,7 +300,7 @@ def label_of(reference: Mapping[str, Any]) -> str:
             text = f"{text[:-1]}, {key}={text_of(reference[key])})"
     if NO_TEXT in text:  # two such markers would bear one label
         raise cannot(
-            f"the place of an unnamed marker of {shown(reference.get('body'))} cannot be written as a text; name the "
+            f"the place of an unnamed marker of {printed(reference.get('body'))} cannot be written as a text; name the "
             "marker"
         )
     return f"{reference.get('body')}.at{text}"
@@ -325,7 +325,7 @@ def _summary(entry: DescribedEntry) -> str:
     for key, value in entry.values.items():
         if key == "markers":
             names = list(value) if isinstance(value, Mapping) else [name for name, _ in value]
-            parts.append("markers " + ", ".join(map(shown, names)))
+            parts.append("markers " + ", ".join(map(printed, names)))
         elif entry.path.startswith("functions.") and key in ("x", "y", "z"):
             parts.append(f"{len(items(value) or ())} {key}")
         elif key in ("display", "solids") and all(isinstance(one, Mapping) for one in items(value) or ("",)):
@@ -344,7 +344,7 @@ def _summary(entry: DescribedEntry) -> str:
 
 def model_html(description: Description) -> str:
     """The model as an HTML table, one row an entry."""
-    name = shown(description.values.get("name", ""))
+    name = printed(description.values.get("name", ""))
     rows = [f"<tr><th colspan='3' style='text-align:left'>Model {html_text(name)}</th></tr>"]
     lagrangian = description.values.get("lagrangian")
     if isinstance(lagrangian, Mapping):
@@ -358,7 +358,7 @@ def model_html(description: Description) -> str:
         for k, entry in enumerate(entries):
             first = section if k == 0 else ""
             rows.append(
-                f"<tr><td>{first}</td><td>{html_text(shown(entry.name))}</td>"
+                f"<tr><td>{first}</td><td>{html_text(printed(entry.name))}</td>"
                 f"<td style='text-align:left'>{html_text(_summary(entry))}</td></tr>"
             )
     table = f"<table>{''.join(rows)}</table>"

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..base.operations import OPERATIONS
-from ..base.texts import parse_python, shown
+from ..base.texts import parse_python, quote
 from ..errors import ExpressionError, no_number
 from ..expr.core import Expr, Graph
 from .names import callable_names, nearest
@@ -329,7 +329,7 @@ def constant(text: str, what: str) -> float:
 
     def resolve(name: str) -> Expr:
         if name == text.strip():
-            raise no_number(f"{what} must be a number, not {shown(text)}; {allowed}")
+            raise no_number(f"{what} must be a number, not {quote(text)}; {allowed}")
         raise ExpressionError(f"{name!r} is not a number", remedy=allowed)
 
     try:

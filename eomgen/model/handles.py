@@ -10,7 +10,7 @@ from ..elements.joints import JOINTS
 from ..elements.kinds import Fields
 from ..errors import at_odds, calling_line, ill_placed, ill_typed, no_choice
 from ..expr.records import Record
-from ..expr.texts import shown
+from ..expr.texts import printed
 from .build_elements import coordinate_names, sketch
 from .description import GROUND_NAME, DescribedEntry, Description, as_written, is_zero, items, label_of
 from .mechanism import velocity_names
@@ -50,7 +50,7 @@ class Described:
     @property
     def name(self) -> Any:
         """Name of the model."""
-        return shown(self._description.values.get("name", ""))
+        return printed(self._description.values.get("name", ""))
 
 
 class Wrench(NamedTuple):
@@ -99,7 +99,7 @@ class JointReaction(Wrench):
 def noted(marker: MarkerHandle) -> str:
     """The label of a marker whose motion an expression uses; UsageError if it is none."""
     if not hasattr(marker, "note"):
-        raise ill_typed(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {texts.shown(marker)}")
+        raise ill_typed(f"give a body or a marker, such as m.ground or rod.at(1, 0, 0), not {texts.quote(marker)}")
     marker.note()
     return marker.label
 
@@ -371,8 +371,8 @@ def _derivative(order: int, doc: str) -> Any:
     def read(joint: JointHandle) -> Any:
         names = joint.coordinate_names
         if len(names) != 1:
-            shown = ", ".join(names) or "none"
-            raise ill_placed(f"joint {joint.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
+            listed = ", ".join(names) or "none"
+            raise ill_placed(f"joint {joint.name!r} has {len(names)} coordinates ({listed}); use .coordinates")
         return symbol(names[0] + RATES[order])
 
     return property(read, doc=doc)
@@ -424,7 +424,9 @@ class Settings(dict[str, Any]):
         """Set the given entries, those of mappings first, and keep the others."""
         for raw in mappings:
             if not isinstance(raw, Mapping):
-                message = f"values are given by name, as in initial(theta=0.3) or a mapping, not as {shown(raw)} alone"
+                message = (
+                    f"values are given by name, as in initial(theta=0.3) or a mapping, not as {printed(raw)} alone"
+                )
                 raise ill_typed(message)
         named = [str(name) for raw in (*mappings, values) for name in raw]
         if twice := sorted({name for name in named if named.count(name) > 1}):

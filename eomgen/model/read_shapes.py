@@ -23,7 +23,7 @@ from ..contact.states import (
 )
 from ..elements import kinds
 from ..expr.core import Expr
-from ..expr.texts import shown
+from ..expr.texts import printed
 from .build_functions import read_table
 from .checks import check_keys
 from .description import items
@@ -185,7 +185,7 @@ def _count(reader: Reader, path: str, kind: str, raw: Mapping[str, Any]) -> int 
     count, (key, least, most, _) = count_of(kind, raw), COUNTED[kind]
     if count is None:
         remedy = f"give a whole number {f'of {least} or more' if most == math.inf else f'from {least} to {most}'}"
-        reader.fault(f"{path}.{key}", f"is {shown(raw[key])}", remedy, "EG-RANGE")
+        reader.fault(f"{path}.{key}", f"is {printed(raw[key])}", remedy, "EG-RANGE")
     return count
 
 

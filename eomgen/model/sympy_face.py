@@ -11,7 +11,7 @@ from typing import Any
 from unicodedata import normalize
 
 from ..base.operations import OPERATIONS
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import ExpressionError, ModelError, Problem, cannot, ill_typed
 from ..expr.core import Expr, Graph
 from ..expr.functions import Function
@@ -29,7 +29,7 @@ Resolve = Callable[[str], Expr]
 def require_name(what: str, name: Any) -> str:
     """The name that was given for something; UsageError if it is no text."""
     if not isinstance(name, str):
-        raise ill_typed(f"{what}: a name is a text, such as 'A', not {shown(name)}")
+        raise ill_typed(f"{what}: a name is a text, such as 'A', not {quote(name)}")
     return name
 
 
@@ -38,7 +38,7 @@ def named(what: str, raw: Any) -> dict[Any, Any]:
     if raw is None:
         return {}
     if not isinstance(raw, Mapping):
-        raise ill_typed(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {shown(raw)}")
+        raise ill_typed(f"{what} must be a mapping of names to values, such as {{'m': 2.0}}, not {quote(raw)}")
     return {require_name(what, name_of(key)): value for key, value in raw.items()}
 
 

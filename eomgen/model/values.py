@@ -37,7 +37,7 @@ from ..errors import ExpressionError
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.latex import NotationError, read_latex, spaced
-from ..expr.texts import quoted, shown
+from ..expr.texts import printed, quoted
 from ..expr.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
@@ -118,7 +118,7 @@ class Reader:
 
     def unknown(self, path: str, what: str, name: object, known: Iterable[str], listed: str) -> None:
         """Note a name that is none of the known ones, which are listed as such."""
-        remedy = nearest(shown(name), self.faults.names_at(path, known), listed)
+        remedy = nearest(printed(name), self.faults.names_at(path, known), listed)
         self.fault(path, f"no {what} {quoted(name)}", remedy, "EG-NAME-UNKNOWN")
 
     def type_of(self, path: str, values: Mapping[str, Any], types: Iterable[str], what: str, key: str = "type") -> str:
@@ -130,7 +130,7 @@ class Reader:
             code = "EG-MISSING" if what in ("joint", "solid") else "EG-CHOICE"
             self.fault(f"{path}.{key}", "is missing", f"give one of {', '.join(types)}", code)
         else:
-            remedy = nearest(shown(raw), types, "types")
+            remedy = nearest(printed(raw), types, "types")
             self.fault(f"{path}.{key}", f"no {what} of type {quoted(raw)}", remedy, "EG-CHOICE")
         return ""
 
@@ -512,7 +512,7 @@ def take_coordinates_latex(
                 take_latex(reader, f"{path}.{name}", name, text)
             else:
                 kind = f"coordinates{' and velocities' * bool(others)}"
-                reader.unknown(f"{path}.{shown(name)}", "coordinate", name, [*coordinates, *others], kind)
+                reader.unknown(f"{path}.{printed(name)}", "coordinate", name, [*coordinates, *others], kind)
         return
     listed = [raw] if isinstance(raw, str) else items(raw)
     if listed is None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
-from ..base.texts import fold, shown
+from ..base.texts import fold, quote
 from ..errors import AssemblyError, cannot, ill_typed, off_range
 from ..expr.core import Expr, copied
 from ..expr.records import Record
@@ -154,7 +154,7 @@ def derive_mechanism(
 def choose_method(mechanism: Mechanism, method: str) -> str:
     """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
     if not isinstance(method, str):
-        raise ill_typed(f"method must be the name of a method, not {shown(method)}")
+        raise ill_typed(f"method must be the name of a method, not {quote(method)}")
     if mechanism.written is not None:
         if method not in ("auto", GIVEN):
             raise cannot(f"method {method!r} needs bodies; for given equations there are: auto, {GIVEN}")

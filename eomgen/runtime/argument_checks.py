@@ -16,7 +16,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.kernel_table import argument
 from ..base.limits.runs import MOST_NUMBERS, MOST_STEPS
-from ..base.texts import shown, undotted
+from ..base.texts import quote, undotted
 from ..base.value_rules import as_count, read_count
 from ..errors import (
     MissingDependencyError,
@@ -115,7 +115,7 @@ def read_vector(what: str, raw: Any, n: int, error: Callable[[str], Exception] =
     """An array of n floats."""
     result = as_real(raw)
     if result is None:
-        raise error(f"{what} must hold real numbers, ({n},), not {shown(raw)}")
+        raise error(f"{what} must hold real numbers, ({n},), not {quote(raw)}")
     if result.shape != (n,):
         raise error(f"{what} must have shape ({n},), not {result.shape}")
     return result
@@ -180,7 +180,7 @@ def read_plain(what: str, raw: Any) -> float:
     else:
         collected = as_real(raw)
         if collected is None or collected.ndim:
-            raise no_number(f"{what} must be a number, not {shown(raw)}")
+            raise no_number(f"{what} must be a number, not {quote(raw)}")
         result = float(collected)
     if not isfinite(result):
         raise no_number(f"{what} must be finite, not {result}")
@@ -212,14 +212,14 @@ def with_numbers(what: str, raw: Any, depth: int = 0) -> Any:
 def read_flag(what: str, raw: Any) -> bool:
     """True or False."""
     if not isinstance(raw, (bool, np.bool_)):
-        raise ill_typed(f"{what} must be True or False, not {shown(raw)}")
+        raise ill_typed(f"{what} must be True or False, not {quote(raw)}")
     return bool(raw)
 
 
 def _floats(what: str, raw: Any, wanted: str) -> Array:
     result = as_real(with_numbers(what, raw))
     if result is None:
-        raise ill_typed(f"{wanted}, not {shown(raw)}")
+        raise ill_typed(f"{wanted}, not {quote(raw)}")
     return result
 
 
@@ -231,10 +231,10 @@ def read_axis(label: str, raw: Any) -> Array:
         raw = np.linspace(read_number(what, raw[0]), read_number(what, raw[1]), count)
     values = as_real(raw)
     if values is None:
-        raise ill_typed(f"{what}, not {shown(raw)}")
+        raise ill_typed(f"{what}, not {quote(raw)}")
     steps = np.diff(values) if values.ndim == 1 else np.empty(0)
     if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise ill_typed(f"{what}, not {shown(raw)}")
+        raise ill_typed(f"{what}, not {quote(raw)}")
     return values
 
 
@@ -313,14 +313,14 @@ def read_names(what: str, raw: Any) -> tuple[str, ...]:
     except TypeError:
         names = (None,)
     if not all(isinstance(name, str) for name in names):
-        raise ill_typed(f"{what} must be a name or a list of names, not {shown(raw)}")
+        raise ill_typed(f"{what} must be a name or a list of names, not {quote(raw)}")
     return names
 
 
 def require_mapping(what: str, raw: Any) -> None:
     """Refuse what does not give values by name."""
     if not isinstance(raw, Mapping):
-        raise ill_typed(f"{what} must be a mapping of names to values, not {shown(raw)}")
+        raise ill_typed(f"{what} must be a mapping of names to values, not {quote(raw)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:

@@ -12,7 +12,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.limits.constraints import STATE as RANK
 from ..base.scales import Scales
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import ill_shaped, no_number
 from .argument_checks import as_real, read_number, read_numbers, with_numbers
 from .kernels import into
@@ -105,7 +105,7 @@ def read_states(module: BoundModel, t: ArrayLike, x: ArrayLike) -> tuple[Array, 
     columns = state[:, None] if single else state
     time = as_real(read_number("t", t) if isinstance(t, str) else with_numbers("t", t))
     if time is None:
-        raise no_number(f"t must be a number or an array of them, not {shown(t)}")
+        raise no_number(f"t must be a number or an array of them, not {quote(t)}")
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
         raise ill_shaped(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
     return np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:])), np.ascontiguousarray(columns), single

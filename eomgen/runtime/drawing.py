@@ -15,7 +15,7 @@ from ..base.algebra import Array
 from ..base.kernel_table import KERNELS, Kernel
 from ..base.picture_data import read_picture
 from ..base.results import picture_html, side_by_side
-from ..base.texts import aligned_rows, html_table, html_text, shown, visible
+from ..base.texts import aligned_rows, html_table, html_text, quote, visible
 from ..errors import MissingDependencyError, ill_shaped, ill_typed, incomplete
 from .argument_checks import read_number, require, unknown, with_numbers
 from .plotting import choose, height, printed_names, refined, stack, states_at
@@ -148,7 +148,7 @@ def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundM
     """The module of a run with its parameters bound."""
     if model is not None:
         if not hasattr(model, "x_names"):
-            raise ill_typed(f"model must be a module, as Model.compile() returns, not {shown(model)}")
+            raise ill_typed(f"model must be a module, as Model.compile() returns, not {quote(model)}")
         if tuple(trajectory.x_names) != model.x_names:
             raise ill_shaped(
                 f"the trajectory of {trajectory.name!r} has states {', '.join(trajectory.x_names)}; module "

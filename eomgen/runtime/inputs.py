@@ -23,7 +23,7 @@ from ..base.limits.numbers import TINY
 from ..base.limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE, LOCATED, MOMENT
 from ..base.operations import OPERATIONS, operations_with, play_arrays
 from ..base.splines import curve_coefficients, slopes
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import (
     ExpressionError,
     MissingDependencyError,
@@ -365,7 +365,7 @@ class Forcing:
         if result is None or result.ndim:
             raise ill_typed(
                 f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
-                f"f(t, x), not {shown(value)}"
+                f"f(t, x), not {quote(value)}"
             )
         return read_number(f"input {name}", value)
 
@@ -452,7 +452,7 @@ class Forcing:
         if result is not None and not result.ndim:
             return float(result)
         many = isinstance(value, np.ndarray) and value.ndim
-        returned = f"an array of shape {value.shape}" if many else shown(value)
+        returned = f"an array of shape {value.shape}" if many else quote(value)
         raise ill_shaped(
             f"input {self.names[index]} must be one number at each time, but its function returned {returned} "
             f"at t = {t:.6g} s"

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.algebra import Array
 from ..base.files import as_path, whole_file
 from ..base.picture_data import GROUND, PlacedFrame, read_picture
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import EvaluationError, ill_typed, no_such, off_range
 from ..expr.notation import Notation
 from .build_scene import build_scene
@@ -159,7 +159,7 @@ def animate(
     forces = (forces,) if isinstance(forces, str) else forces
     if not isinstance(forces, bool | list | tuple):
         raise ill_typed(
-            f"forces must be True, the name of a joint, spring or damper, or a list of names, not {shown(forces)}"
+            f"forces must be True, the name of a joint, spring or damper, or a list of names, not {quote(forces)}"
         )
     for name in plot:  # unknown names fail before anything is drawn
         trajectory[name]
@@ -188,7 +188,7 @@ def write(
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""
     if isinstance(dpi, bool) or not isinstance(dpi, int | float) or not 1.0 <= dpi <= MOST_DOTS:
-        raise off_range(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {shown(dpi)}")
+        raise off_range(f"dpi must be a number from 1 to {MOST_DOTS:g}, not {quote(dpi)}")
     if format in FILMS:
         return InlineFilm(FILMS[format](Frames.of(scene, motion, curves, dpi)), format)
     path = None if file is None else as_path("file", file)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import MissingDependencyError, at_odds, ill_shaped, ill_typed, no_number
 from .axes import telling_values, telling_view
 from .build_scene import build_scene
@@ -47,7 +47,7 @@ def position(module: Any, x: Any, t: float) -> Array:
     try:
         raw = np.asarray(x, dtype=float)
     except (TypeError, ValueError):
-        raise ill_typed(f"x must be a state, a position or values by name, not {shown(x)}") from None
+        raise ill_typed(f"x must be a state, a position or values by name, not {quote(x)}") from None
     if raw.shape == () and "x" in module.q_names:
         raise ill_shaped(f'x is a whole state here; give the coordinate called x in a mapping: draw({{"x": {raw:g}}})')
     if raw.shape not in ((module.n_x,), (module.n_q,)):
@@ -72,7 +72,7 @@ def draw(
     """See :func:`eomgen.runtime.drawing.draw`."""
     if named:
         if x is not None and not isinstance(x, Mapping):
-            raise at_odds(f"give either a state or values by name, not both: {', '.join(named)} and {shown(x)}")
+            raise at_odds(f"give either a state or values by name, not both: {', '.join(named)} and {quote(x)}")
         x = {**(x or {}), **named}
     scene = build_scene(module, position(module, x, t)[:, None], t, names=names, axes=axes)
     return draw_scene(scene, ax)

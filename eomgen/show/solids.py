@@ -18,7 +18,7 @@ from ..base import algebra
 from ..base.algebra import Array
 from ..base.files import as_name, beside, open_plain
 from ..base.limits.numbers import MESH
-from ..base.texts import shown, visible
+from ..base.texts import quote, visible
 from ..errors import UsageError, bad_data, bad_file, too_large
 from .limits import NOTHING, SAME
 
@@ -203,7 +203,7 @@ def mesh_of(shape: Mapping[str, Any], body: str, model_file: str | None, quiet: 
     except (UsageError, OSError) as error:
         why = visible(str(error.strerror if isinstance(error, OSError) else error), lines=False)
         if not quiet:
-            warnings.warn(f"the mesh {shown(shape['file'])} of {body} is not drawn: {why}", stacklevel=2)
+            warnings.warn(f"the mesh {quote(shape['file'])} of {body} is not drawn: {why}", stacklevel=2)
         return None
     scale = np.asarray(shape["sizes"], dtype=float)
     return vertices * scale, faces if scale.prod() > 0.0 else faces[:, ::-1]

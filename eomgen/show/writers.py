@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.files import as_path, refuse_link, whole_file
-from ..base.texts import shown
+from ..base.texts import quote
 from ..errors import MissingDependencyError, at_odds, bad_file, no_choice
 from .draw import matplotlib
 from .frames import Frames
@@ -118,7 +118,7 @@ def require_target(file: Any, format: Any) -> None:
             require_kind(as_path("file", file))
         return
     if not isinstance(format, str) or format not in FORMATS:
-        raise no_choice(f"format must be one of {', '.join(map(repr, FORMATS))}, not {shown(format)}")
+        raise no_choice(f"format must be one of {', '.join(map(repr, FORMATS))}, not {quote(format)}")
     if file is not None:
         raise at_odds("format= is for an animation without a file; the ending of the file's name selects the kind")
     _require_libraries(f".{format}")

@@ -19,7 +19,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 
-from ..base.texts import shown
+from ..base.texts import quote
 from ..base.value_rules import as_count, read_count
 from ..errors import ToolchainError, ill_typed, no_choice, off_range
 
@@ -393,12 +393,12 @@ class Options:
                 continue
             if as_count(raw) not in allowed:
                 *but, last = allowed
-                raise no_choice(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {shown(raw)}")
+                raise no_choice(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {quote(raw)}")
             object.__setattr__(self, name, as_count(raw))
         if self.jobs is not None:
             object.__setattr__(self, "jobs", read_count("jobs, files compiled at a time,", self.jobs, 1))
         if not isinstance(self.compiler, str | None):
-            raise ill_typed(f"compiler must be a text, the command line of a compiler, not {shown(self.compiler)}")
+            raise ill_typed(f"compiler must be a text, the command line of a compiler, not {quote(self.compiler)}")
         if isinstance(self.extra, str):
             raise ill_typed(f"extra must be a sequence of flags, not the text {self.extra!r}")
         object.__setattr__(self, "extra", tuple(self.extra))

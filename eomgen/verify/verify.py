@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.limits.numbers import EPS
 from ..base.limits.runs import MOST_STATES
-from ..base.texts import shown
+from ..base.texts import quote
 from ..base.value_rules import read_count
 from ..errors import EomgenError, off_range
 from ..runtime.runs.events import inner_run
@@ -78,7 +78,7 @@ def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
         or not isinstance(seconds, int | float | np.integer | np.floating)
         or not seconds >= 0.0
     ):
-        raise off_range(f"verify: seconds must be the time for all checks, a number of 0 or more, not {shown(seconds)}")
+        raise off_range(f"verify: seconds must be the time for all checks, a number of 0 or more, not {quote(seconds)}")
     most = read_count("verify: states, the number of random states,", states, 1, MOST_STATES)
     return most, read_count("verify: seed, of the random states,", seed)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.algebra import Array, Indices
 from ...base.files import as_path, open_plain, remove_parts, write_whole
-from ...base.texts import shown
+from ...base.texts import quote
 from ...errors import EomgenError, MissingDependencyError, UsageError, bad_data, bad_file, cannot, ill_typed, no_choice
 from ..inputs import Forcing
 from ..kernels import eager
@@ -442,7 +442,7 @@ def choose_reduction(reduce: Any) -> Reduction:
     if callable(reduce):
         return Custom(reduce)
     if reduce is not None and not isinstance(reduce, str):
-        raise ill_typed(f"{WANTED}, not {shown(reduce)}")
+        raise ill_typed(f"{WANTED}, not {quote(reduce)}")
     if reduce in (None, "states"):
         return Reduction()
     if reduce == "events":

@@ -41,7 +41,7 @@ from ...base.algebra import Array
 from ...base.kernel_table import RECORD
 from ...base.limits.impacts import HALVINGS, ITERATIONS, SOLVED
 from ...base.limits.runs import SAME
-from ...base.texts import shown
+from ...base.texts import quote
 from ...base.value_rules import as_count
 from ...errors import (
     EvaluationError,
@@ -434,7 +434,7 @@ def step_rigidly(
         raise off_range(f"contact_iterations must be a whole number from 1, not {raw['contact_iterations']}")
     keep = raw.get("contact_forces", False)
     if keep is not True and keep is not False:
-        raise ill_typed(f"contact_forces must be True or False, not {shown(keep)}")
+        raise ill_typed(f"contact_forces must be True or False, not {quote(keep)}")
     bound, forcing, start, end = set_up(module, span, parameters, inputs)
     if end < start:
         raise cannot("method moreau runs forwards only: impacts cannot be undone")
@@ -526,7 +526,7 @@ def _require_it(module: BoundModel, method: Any) -> None:
     """Refuse another method for a model with rigid contacts."""
     if not isinstance(method, str) or method != NAME:
         names = module.info.rigid_only
-        stored_times = "" if method is None else f", not {method if isinstance(method, str) else shown(method)}"
+        stored_times = "" if method is None else f", not {method if isinstance(method, str) else quote(method)}"
         raise cannot(
             f"contacts {names[0]!r} have the law rigid, which exerts impulses, not forces: run with "
             f"method='moreau' and step={stored_times}, or choose another law"

@@ -22,7 +22,7 @@ import numpy as np
 from ...base.algebra import Array
 from ...base.limits.constraints import MEASURED
 from ...base.limits.runs import CROWD, EARLIEST, INSTANT, MOST_STEPS, WHOLE
-from ...base.texts import parse_python, shown
+from ...base.texts import parse_python, quote
 from ...base.value_rules import as_count
 from ...errors import (
     SimulationError,
@@ -86,7 +86,7 @@ class RunEvent:
         value = self.function(t, x)
         result: Any = as_real(value)
         if result is None or result.ndim or not (for_slope or isfinite(result)):
-            text = shown(value if result is None or result.ndim else float(result))
+            text = quote(value if result is None or result.ndim else float(result))
             raise no_number(
                 f"event {self.name} is {text} at t = {t:.6g} s; its function must return a finite number at every "
                 "time and state of the run; an expression as a text may be undefined in parts of it"
@@ -257,7 +257,7 @@ def _times(name: str, raw: Any) -> int:
     if result is None or result < 0:
         raise off_range(
             f"event {name}: terminal must be true, false, or the number of events that ends the run (1, 2, ...), "
-            f"not {shown(raw)}"
+            f"not {quote(raw)}"
         )
     return result
 
@@ -418,7 +418,7 @@ class Controller:
         result = as_real(raw)
         if result is None or result.ndim or not np.isfinite(result):
             raise SimulationError(
-                f"the controller of {self.name} must return one finite number, but returned {shown(raw)} "
+                f"the controller of {self.name} must return one finite number, but returned {quote(raw)} "
                 f"at t = {t:.6g} s",
                 code="EG-NUMBER",
             )
@@ -439,7 +439,7 @@ def _by_event(layout: Layout, raw: Any) -> dict[int, list[Controller]]:
     check_names("sampled state without a law", wanted, taken)
     for name, function in wanted.items():
         if not callable(function):
-            raise ill_typed(f"the controller of {name} must be a function f(t, x), not {shown(function)}")
+            raise ill_typed(f"the controller of {name} must be a function f(t, x), not {quote(function)}")
         require_time_and_state(f"the controller of {name}", function)
     result: dict[int, list[Controller]] = {}
     for clock in clocks:

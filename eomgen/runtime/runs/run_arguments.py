@@ -14,7 +14,7 @@ from ...base import algebra
 from ...base.algebra import Array
 from ...base.limits.constraints import ALIKE
 from ...base.limits.runs import ATOL, LEAST_RTOL, RTOL, SUNK
-from ...base.texts import shown
+from ...base.texts import quote
 from ...errors import (
     AssemblyError,
     EvaluationError,
@@ -135,11 +135,11 @@ def _tolerance(name: str, raw: Any, n: int) -> Any:
         return raw
     values = as_real(read_number(name, raw) if isinstance(raw, str) else raw)
     if values is None:
-        raise no_number(f"{name} must be a number, or one for each of the {n} states, not {shown(raw)}")
+        raise no_number(f"{name} must be a number, or one for each of the {n} states, not {quote(raw)}")
     if values.shape not in ((), (n,)):
         raise ill_shaped(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
     if not (np.isfinite(values).all() and (values >= 0.0).all()):
-        raise off_range(f"{name} must not be negative and must be finite, not {shown(raw)}")
+        raise off_range(f"{name} must not be negative and must be finite, not {quote(raw)}")
     return values if values.ndim else float(values)
 
 
@@ -149,7 +149,7 @@ def check_step(name: str, raw: Any) -> float:
         return raw
     result = as_real(read_number(name, raw) if isinstance(raw, str) else raw)
     if result is None or result.ndim:
-        raise no_number(f"{name} must be a number of seconds, not {shown(raw)}")
+        raise no_number(f"{name} must be a number of seconds, not {quote(raw)}")
     value = float(result)
     if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
         raise off_range(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {raw}")
@@ -218,7 +218,7 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if isinstance(span, str) or (pair is not None and not pair.ndim):
         return 0.0, read_number("the end of the span", span)
     if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
-        raise ill_typed(f"span must be (start, end) in seconds, not {shown(span)}; t_eval= chooses times to keep")
+        raise ill_typed(f"span must be (start, end) in seconds, not {quote(span)}; t_eval= chooses times to keep")
     return float(pair[0]), float(pair[1])
 
 
@@ -255,7 +255,7 @@ def declared_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]
 def check_method(method: Any, step: Any) -> float | None:
     """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
     if method is not None and not isinstance(method, (str, type)):
-        raise no_choice(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
+        raise no_choice(f"method must be a name or a subclass of OdeSolver, not {quote(method)}")
     if isinstance(method, str) and method not in NAMES:
         raise unknown("method", method, NAMES)
     if (isinstance(method, str) and method == "RK4") != (step is not None):
