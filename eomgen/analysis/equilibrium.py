@@ -185,8 +185,9 @@ def equilibrium(
 ) -> Equilibrium:
     """Find a position at rest in which all forces are in balance (by virtual work) and no first-order state changes.
 
-    Newton's iteration is tried first, then the motion in a viscous fluid.  Angles in loops are those to which a motion
-    leads from the declared position, or from a guess of all coordinates, not whole turns away.
+    Newton's iteration is tried first, then the motion in a viscous fluid, then damped Gauss-Newton steps.  Angles in
+    loops are those to which a motion leads from the declared position, or from a guess of all coordinates, not whole
+    turns away.
 
     Parameters
     ----------

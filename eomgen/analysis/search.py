@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
+from ..base.assembly import close
 from ..base.limits.numbers import EPS, TINY
 from ..base.scales import largest
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
@@ -358,6 +359,50 @@ def _polished(search: Search, point: SearchPoint, solver: Solver, change: Array)
     return point
 
 
+class BalanceRows:
+    """What must vanish, in the sizes of its terms at the start, as equations that :func:`close` takes.
+
+    Its places are iterates with the equations near them, or None.
+    """
+
+    long = None
+
+    def __init__(self, search: Search, point: SearchPoint) -> None:
+        linear = search.linearize(point)
+        self.search, self.scales, self.start, self.steps = search, self, (point, linear), 0
+        self.sizes = Solver(linear).sizes
+        norms = np.linalg.norm(linear.J / self.sizes[:, None], axis=0)
+        self.columns = np.diag(1.0 / np.where(norms > 0.0, norms, 1.0))
+
+    def evaluate(self, place: tuple[SearchPoint, LinearizedResidual] | None) -> tuple[Array, Array]:
+        """The residual (m,) and its derivatives (m, k); NaN where there is none."""
+        shape = len(self.sizes), len(self.columns)
+        if place is None or place[1].J.shape != shape:
+            return np.full(shape[0], np.nan), np.full(shape, np.nan)
+        here = place[0].here
+        return self.search.residual(here, here) / self.sizes, place[1].J / self.sizes[:, None]
+
+    def move(
+        self, place: tuple[SearchPoint, LinearizedResidual], change: Array
+    ) -> tuple[SearchPoint, LinearizedResidual] | None:
+        self.steps += 1
+        there = self.search.step(place[0], place[1].moved @ change, place[1].changed @ change)
+        try:
+            return None if there is None else (there, self.search.linearize(there))
+        except (AssemblyError, EvaluationError, PartitionError, UsageError):
+            return None
+
+    def rounding(self, _: Any, J: Array) -> Array:
+        """None of its own: Newton's iteration, which comes last, judges it."""
+        return np.zeros(len(J))
+
+
+def descend(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
+    """Down the residual, by the damped steps that close loops."""
+    rows = BalanceRows(search, point)
+    return close(rows, rows.start, STEPS, metric=rows.columns)[0][0], rows.steps, False
+
+
 # -- viscous descent ---------------------------------------------------------------------------------------------------
 
 # Implicit Euler steps of q' = v'(q) (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35
@@ -467,7 +512,8 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     """From a position: each way in turn until one leads to balance.
 
     Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
-    leads to a stable equilibrium; the others find what is far, and what plain Newton finds.
+    leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what damped steps down the
+    residual find.
     """
     start = search.start(q)
     first, steps, balanced = newton(search, start, reach=REACH)
@@ -476,6 +522,7 @@ def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     ways: list[Callable[[], tuple[SearchPoint, int, bool]]] = [
         lambda: newton(search, start),
         lambda: newton(search, start, plain=True),
+        lambda: descend(search, start),
     ]
     if not search.names:
         ways.insert(0, lambda: creep(search, start))

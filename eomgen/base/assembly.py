@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import chain, islice
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -90,10 +90,13 @@ class ClosureSystem(NamedTuple):
         return e, J * self.free
 
 
+Q = TypeVar("Q")  #: a position, as the system has it
+
+
 def close(
-    system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | None = DAMPING, metric: Array | None = None
-) -> tuple[Array, float]:
-    """Minimise the scaled residual of a system from q.
+    system: Any, q: Q, steps: int = STEPS, damping: float | None = DAMPING, metric: Array | None = None
+) -> tuple[Q, float]:
+    """Minimise the scaled residual of a :class:`ClosureSystem`, or of equations with the same calls, from q.
 
     Damping at first: 0 where q is near a closed position, so that directions that hardly count do not creep; None for
     steps of least squares, which keep all digits beside singular positions and may lead far away from them.  Steps are
