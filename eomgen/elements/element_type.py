@@ -273,6 +273,12 @@ class TypeTable(UserDict[str, ElementType]):
             self.data[name] = import_module(self.data[name]).TYPES[name]
         return self.data[name]  # type: ignore[no-any-return]
 
+    def __or__(self, other: Mapping[str, ElementType]) -> dict[str, ElementType]:  # type: ignore[override]
+        return {**self, **other}
+
+    def __ror__(self, other: Mapping[str, ElementType]) -> dict[str, ElementType]:  # type: ignore[override]
+        return {**other, **self}
+
 
 def table(*types: ElementType) -> dict[str, ElementType]:
     """Types by their names."""

@@ -242,7 +242,11 @@ def _arity_meant(entry: DescribedEntry) -> int:
 def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
     raw = reader.type_of(entry.path, entry.values, FUNCTION, "function")
     if raw:
-        fields = function_fields(raw) | (PYTHON_SLOPES if raw == "native" else {})
+        callables = [
+            entry.values.get("python"),
+            *(f for key in PYTHON_SLOPES for f in items(entry.values.get(key)) or ()),
+        ]
+        fields = function_fields(raw) | (PYTHON_SLOPES if any(map(callable, callables)) else {})
         check_keys(entry.path, entry.values, fields, reader.faults)
     if reader.faults.under(entry.path):
         return None

@@ -65,7 +65,10 @@ SAMPLED = ElementType(
             doc="the new value, of what the rate of a state may depend on; without one the state keeps its value, "
             "unless a run gives a function for it: ``simulate(controllers={name: f})``"
         ),
-        **{key: STATE[key] for key in ("period", "offset")},
+        "period": STATE["period"].replace(
+            doc="time from one sampling time to the next (s); of parameters, if an expression"
+        ),
+        "offset": STATE["offset"].replace(doc="a sampling time (s), 0 unless given; of parameters too"),
         "initial": STATE["initial"].replace(doc="the value before the first sampling time", default=0.0),
         **{key: STATE[key] for key in ("unit", "doc", "latex")},
     },

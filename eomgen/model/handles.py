@@ -131,7 +131,7 @@ class ForceHandle(ElementHandle):
     """A force element of the model; what it does can stand in outputs, events and other laws."""
 
     force = _of_element(
-        "force", "Force along its path (N or N m), positive where it increases it; of a contact normal."
+        "force", "Force along its path (N or N m), positive where it increases it; of a contact the normal force."
     )
     length = _of_element("length", "Length or angle of its path (m or rad), or penetration of a contact (m).")
     rate = _of_element("rate", "Rate of :attr:`length` (m/s or rad/s).")

@@ -120,7 +120,9 @@ def trajectory_facts(trajectory: Any) -> tuple[str, list[tuple[str, str]]]:
         lines.append(("range", over) if over and trajectory.t[0] == trajectory.t[-1] else ("time", span))
     method = str(header.get("method"))
     if header.get("rtol") is not None:
-        method += f", rtol {header['rtol']:.3g}, atol {header['atol']:.3g}, {trajectory.nfev} calls"
+        method += (
+            f", rtol {header['rtol']:.3g}, atol {header['atol']:.3g}, {trajectory.nfev} calls of the right-hand side"
+        )
     elif "missed_steps" in header:
         method += f", {header['steps']} steps of {header['options']['step']:g} s"
     lines.append(("method", method))

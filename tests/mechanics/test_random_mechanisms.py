@@ -309,8 +309,13 @@ class Balance:
         arms = np.einsum("kij,kj->ki", m.R, numbers.centers)
         J = m.J_r + np.cross(m.J_w, arms[:, :, None], axis=1)
         M = np.einsum("k,kia,kib->ab", rigid[0], J, J) + np.einsum("kia,kij,kjb->ab", m.J_w, rigid[1], m.J_w)
-        np.testing.assert_allclose(module.mass_matrix(q), M, rtol=0, atol=1e-10 * sized(M))
-        assert module.energy(self.x)[0] == pytest.approx(0.5 * m.v @ M @ m.v, rel=1e-9)
+        mass = module.mass_matrix(q)
+        np.testing.assert_allclose(mass, mass.T, rtol=0, atol=1e-15 * sized(M))
+        np.testing.assert_allclose(mass, M, rtol=0, atol=1e-10 * sized(M))
+        assert (
+            min(np.linalg.eigvalsh(mass)[0], np.linalg.eigvalsh(module.embedded_mass_matrix(q)).min(initial=1.0)) > 0.0
+        )
+        assert module.energy(self.x)[0] == pytest.approx(0.5 * m.v @ mass @ m.v, rel=1e-12)
         lacking, forces = self.needed() - self.wrenches, M @ m.a + module.bias(TIME, self.x)
         expected = np.einsum("kia,ki->a", np.concatenate([m.J_r, m.J_w], axis=1), lacking)
         size = max(sized(lacking), sized(M @ m.a), sized(forces))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import runpy
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any, ClassVar
 
 import numpy as np
@@ -229,3 +231,16 @@ def test_keys_called_as_their_type_are_arguments_of_that_name() -> None:
     assert "rack : handle" in m.rack.__doc__
     assert "cam : handle" in m.cam.__doc__
     assert "value : scalar" in m.sampled.__doc__
+
+
+def test_tables_name_the_types_of_their_files_and_what_was_added() -> None:
+    for table, new, *packages in (
+        (FORCES, "hardening_spring", "elements.forces", "contact"),
+        (CONSTRAINTS, "level", "elements.constraints"),
+    ):
+        homes = [import_module(f"eomgen.{package}") for package in packages]
+        files = [
+            import_module(f"{home.__name__}.{file.name}") for home in homes for file in iter_modules(home.__path__)
+        ]
+        assert {*table} == {new, *(name for file in files for name in getattr(file, "TYPES", ()))}
+        assert len(table | {"other": None}) == len({"other": None} | table) == len(table) + 1
