@@ -20,9 +20,9 @@ from ..base.limits.positions import MOST_ANGLE
 from ..base.texts import angle_in_degrees
 from ..errors import calls_within, ill_placed, ill_shaped, no_number
 from .argument_checks import both_names, read_number, read_numbers, require_mapping
-from .initial import Given, Initial, assemble_batch
+from .initial import Given, Initial
 from .kernels import Kernels, public_call, reduce
-from .layout import Layout, warn_of_fixed
+from .layout import Layout
 from .refusals import require_support
 
 if TYPE_CHECKING:
@@ -259,11 +259,6 @@ class BoundModel:
             from the nearest guess; or an angle of more than two turns is given, as degrees would be.
         """
         initial, raw = self._given(values, named, t, p, u)
-        bound = initial.kernels.context
-        x, good = assemble_batch(initial.kernels, raw.positions | raw.rates, 1, bound.p, bound.u, initial.t)
-        if good[0]:
-            warn_of_fixed(self.layout, bound.p, [n for n in self.layout.initial if n not in raw.positions | raw.rates])
-            return x[:, 0]
         q = initial.assembled(raw.positions)
         v = initial.velocities(q, raw.rates if raw.positions or raw.rates else None)
         return np.concatenate([q, v])

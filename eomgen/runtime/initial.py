@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,14 +22,11 @@ from ..base.assembly import (
     closed,
     starts,
 )
-from ..base.continuation import LONGEST, follow
+from ..base.continuation import follow
 from ..base.limits.constraints import (
     ACCEPTED,
     BRANCH_STEP,
-    CONTRADICTION,
     COUPLED,
-    EXACT,
-    GIVEN,
     GONE,
     INDEPENDENT,
     MEASURED,
@@ -38,7 +35,6 @@ from ..base.limits.constraints import (
     SETTLED,
     SHORT,
     STILL,
-    STRUCTURE,
     UNMOVED,
 )
 from ..base.scales import largest
@@ -46,7 +42,7 @@ from ..base.texts import place_of_marker
 from ..errors import TO_BE_FINITE, AssemblyError, UsageError, calls_within, cannot, not_finite
 from .argument_checks import UnknownNameError, unknown, without_dots
 from .kernels import Kernels, constraint_system, place
-from .layout import values_at, warn_of_fixed
+from .layout import warn_of_fixed
 
 # -- rank at other parameters ------------------------------------------------------------------------------------------
 
@@ -749,139 +745,3 @@ class Initial:
         if name in layout.loop_rates:
             name = layout.loops[layout.loop_rates.index(name)]
         return self.system.gradients(q, name)
-
-
-# -- many starts at a time ---------------------------------------------------------------------------------------------
-
-# The kernel ``kinematics`` closes the loops of all starts at given values of the independent coordinates.  From the
-# reference position, values held, theirs or as many others, go to those given in short strides.  Each position must lie
-# where a smooth motion passes: by one half way to other parameters, and by the rates at both ends of a stride.  A start
-# is left to Initial where that does not hold, at singular positions, and where a value is refused.
-
-
-SMOOTH = 0.1  #: part of the way to a position by which one half way, or the rates at its ends, may miss it
-STRIDE = 0.1  #: scaled way of held values from one closed position to the next
-CORRECTIONS = 4  #: Newton's steps to held values of other coordinates, each of which squares the error
-KERNELS = ("kinematics", "constraints", "constraint_jacobian", "velocity_constraints", "alignment")
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
-
-
-def assemble_batch(
-    kernels: Kernels, values: Mapping[str, Any], count: int, p: Array, u: Array, t: float
-) -> tuple[Array, Mask]:
-    """The states (n_x, k) of so many starts from named values, numbers or (k,), and which they are.
-
-    Parameters (n_p,) or (n_p, k) and inputs are those of the starts.  The others are left to :class:`Initial`.
-    """
-    layout, entries, core = kernels.layout, [*kernels.layout.x], kernels.core
-    n_q, n, independent, info = layout.n_q, layout.n_v, layout.independent_q, layout.info
-    now, good = values_at(layout, p), np.zeros(count, dtype=bool)
-    x = np.repeat(np.concatenate([layout.q_reference, np.zeros(n)])[:, None], count, axis=1)
-    named = {**info.initial, **now, **values}
-    if layout.quaternion_slots or layout.general_rates or layout.initial_outputs or not {*named} <= {*entries}:
-        return x, good
-    for name, value in named.items():
-        x[entries.index(name)] = value
-    declared, given = ([i for i in map(entries.index, names) if i < n_q] for names in (info.initial, values))
-    complete, whole = {*declared} == {*independent.tolist()}, len(given) == len(independent)
-    direct = not given or {*given} <= {*independent.tolist()}
-    late = not {*now}.isdisjoint(layout.q)
-    if layout.n_h and (
-        layout.n_c > layout.n_h or (given and late) or not (whole or (complete and direct) or not (given or late))
-    ):
-        return x, good
-    if not layout.n_c:
-        return x, np.isfinite(x).all(axis=0)
-    if t or "kinematics" not in core.names:
-        return x, good
-    good, held = np.isfinite(x).all(axis=0), independent if direct else np.array(given)
-    kinematics, constraints, jacobian, rate, alignment = (kernels.kernel(name, nan=True) for name in KERNELS)
-    sizes = np.repeat(np.concatenate([layout.scales.q, layout.scales.c])[:, None], count, axis=1)
-    if "scales" in core.names and p.ndim > 1:
-        sizes = kernels.kernel("scales", nan=True)(np.empty((0, count)), p=p)
-    every, still = np.arange(count), np.zeros((len(layout.independent), count))
-
-    def bound(starts: Indices, part: float = 1.0) -> dict[str, Array]:
-        """Parameters and inputs of some starts, or of a part of the way there from those declared."""
-        made = {}
-        for name, raw, old in (("p", p, info.p_values), ("u", u, info.u_values)):
-            if raw.size or raw.ndim == 1:
-                made[name] = raw if raw.ndim == 1 else raw[:, starts]
-                if part < 1.0:
-                    first = np.array(old, dtype=float).reshape(-1, *[1] * (raw.ndim - 1))
-                    made[name] = first + part * (made[name] - first)
-        return made
-
-    def solve(y: Array, change: Array, guess: Array, starts: Indices = every, part: float = 1.0) -> Array:
-        """Positions and velocities (n_x, k) next to a guess."""
-        result = kinematics(np.concatenate([y, change, still[:, starts], guess]), t=t, **bound(starts, part))
-        return np.asarray(result[: n_q + n])
-
-    def is_smooth(gap: Array, way: Array, starts: Indices = every) -> Mask:
-        gap, way = (np.abs(part / sizes[:n_q, starts]).max(axis=0, initial=0.0) for part in (gap, way))
-        return np.asarray(gap <= SMOOTH * way + SHORT)  # False for NaN
-
-    def independent_rates(q: Array, change: Array, starts: Indices) -> Array:
-        """Rates (n_dof, k) of the independent velocities with which held values change so much."""
-        result = still[:, starts]
-        if direct:
-            result[: len(change)] = change
-            return result
-        units = np.eye(len(still))[: len(held), :, None] + result
-        slopes = np.array([solve(q[independent], unit, q[:n_q], starts)[n_q + held] for unit in units])
-        finite = np.isfinite(slopes).all(axis=(0, 1))
-        good[starts[~finite]] = False
-        inverse = np.linalg.pinv(np.where(finite, slopes, 0.0).transpose(2, 1, 0))
-        result[: len(held)] = _times(inverse, change.T).T
-        return result
-
-    if layout.n_h:
-        target, x[:n_q] = x[held], layout.q_reference[:, None]
-        half, last = (solve(x[independent], still, x[:n_q], every, part) for part in (0.5, 1.0))
-        good &= is_smooth((half - 0.5 * last)[:n_q] - 0.5 * x[:n_q], last[:n_q] - x[:n_q])
-        if not complete:  # what is not declared moves as little as it can
-            good &= np.abs(constraints(x[:n_q], **bound(every)) / sizes[n : n + layout.n_h]).max(axis=0) <= EXACT
-        first = last[held]
-        way = np.abs((target - first) / sizes[held]).max(axis=0, initial=0.0)
-        good &= way <= LONGEST
-        steps = np.ceil(np.where(good, way, 0.0) / STRIDE).astype(int)
-        change = (target - first) / np.maximum(steps, 1)
-        last = solve(last[independent], independent_rates(last, change, every), last[:n_q])
-        for step in range(1, steps.max(initial=0) + 1):
-            some = np.flatnonzero(good & (steps >= step))
-            goal, before = first[:, some] + step * change[:, some], last[:, some]
-            there = before
-            for _ in range(1 if direct else CORRECTIONS):
-                y = there[independent] + independent_rates(there, goal - there[held], some)[: len(independent)]
-                there = solve(y, still[:, some], there[:n_q], some)
-            there = solve(there[independent], independent_rates(there, change[:, some], some), there[:n_q], some)
-            gap = (there - before)[:n_q] - 0.5 * (there + before)[n_q : 2 * n_q]
-            good[some] &= is_smooth(gap, (there - before)[:n_q], some)
-            last[:, some] = there
-        x[:n_q] = solve(target if direct else last[independent], still, last[:n_q])[:n_q]
-        good &= np.abs((x[held] - target) / sizes[held]).max(axis=0, initial=0.0) <= SETTLED
-        x[held] = target
-        if layout.sizes.n_alignments:
-            good &= (alignment(x[:n_q], p=p, u=u) > 0.0).all(axis=0)
-    J = np.ascontiguousarray((jacobian(x[:n_q], **bound(every)) * sizes[:n] / sizes[n:, None]).transpose(2, 0, 1))
-    J[~np.isfinite(J).all(axis=(1, 2))] = 0.0
-    steep = np.linalg.svd(J, compute_uv=False)
-    good &= (steep > STRUCTURE * steep[:, :1]).sum(axis=1) == layout.rank
-    good &= steep[:, layout.rank - 1] > GONE * steep[:, 0]
-    fixed = [i - n_q for i in map(entries.index, named) if i >= n_q]
-    v, free = (x[n_q:] / sizes[:n]).T, np.delete(np.arange(n), fixed)
-    drift = (rate(np.concatenate([x[:n_q], 0.0 * x[n_q:]]), **bound(every)) / sizes[n:]).T
-    inverse = np.asarray(np.linalg.pinv(J[:, :, free], rcond=GIVEN), dtype=float)
-    for _ in range(2):
-        v[:, free] -= _times(inverse, _times(J, v) + drift)
-    left, speeds = np.abs(_times(J, v) + drift).max(axis=1), np.abs(np.hstack([v[:, : layout.moving], drift]))
-    good &= left <= CONTRADICTION * speeds.max(axis=1, initial=1.0)
-    raised = np.abs(np.hstack([v[:, fixed], drift])).max(axis=1, initial=0.0)
-    good &= STILL * speeds.max(axis=1, initial=0.0) <= raised  # False for NaN
-    x[n_q + free] = (v.T * sizes[:n])[free]
-    return x, good
-
-
-def _times(A: Array, x: Array) -> Array:
-    """Matrices (k, m, n) times vectors (k, n), in bits that do not depend on k."""
-    return np.asarray((A @ np.ascontiguousarray(x)[:, :, None])[:, :, 0])
