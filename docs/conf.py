@@ -109,7 +109,7 @@ def make_pages(app: Any, failure: Exception | None) -> None:
     """Pages in which mechanisms run, beside the others that link to them."""
     if failure is None and app.builder.format == "html":
         texts = [(HERE / name).read_text(encoding="utf-8") for name in ("gallery.md", "pictures.md")]
-        for name in re.findall(r'<a href="(\w+)\.html">', "".join(texts)):
+        for name in re.findall(r'<a\s+href="(\w+)\.html">', "".join(texts)):
             eomgen.load_example(name).compile(target="numpy").page(Path(app.outdir) / f"{name}.html")
 
 

@@ -52,7 +52,6 @@ def each_definition(name: str, arguments: Sequence[str], called: str) -> str:
 
 
 def _each(program: str, function: Function, orders: Sequence[int]) -> str:
-    """Its definition."""
     arguments = [f"x{k}" for k in range(function.arity)]
     return each_definition(each_name(function.name, orders), arguments, c_name(program, function.name, orders))
 

@@ -138,7 +138,6 @@ def series_files(program: Program) -> dict[str, str]:
 
 
 def _signed(parts: list[tuple[int, str]]) -> str:
-    """A sum of texts with their signs."""
     text = "".join(f" {'-' if sign < 0 else '+'} {part}" for sign, part in parts)
     return text.removeprefix(" + ") if text.startswith(" + ") else f"-{text[3:]}"
 
@@ -215,7 +214,6 @@ class _SeriesPrinter:
                 result = i, factor
 
     def _scaled(self, name: str, factor: _Factor) -> str:
-        """A sum times what stays the same."""
         if not factor.names:
             return name if factor.number == 1.0 else f"{literal(factor.number)}*{name}"
         product = "*".join([*([] if factor.number == 1.0 else [literal(factor.number)]), *factor.names])

@@ -251,7 +251,6 @@ def _parts(program: Program, used: UsedSum, again: bool) -> dict[str, tuple[str,
 
 
 def _prototype(function: str, arguments: Sequence[str]) -> str:
-    """Declaration of such a function."""
     read = ("given", "rates", "accelerations")
     typed = [f"{'const ' if name in read else ''}double *{name}" for name in arguments]
     return f"void {function}({', '.join(typed)})"

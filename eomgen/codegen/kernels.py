@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 # -- expressions of kernels ---------------------------------------------------------------------------------------
 def _derivatives(terms: SystemTerms, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
-    """All derivatives of rows by symbols."""
     entries = jacobian(rows, terms.symbols(names))
     return [entries.get((i, k), terms.graph.zero) for i in range(len(rows)) for k in range(len(names))]
 

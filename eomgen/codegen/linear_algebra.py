@@ -323,7 +323,6 @@ def _product(a: Row, b: Row, zero: Expr) -> Expr:
 
 
 def _combined(part: Row, rows: Sequence[Row]) -> Row:
-    """A combination of rows."""
     result: Row = {}
     for i, factor in part.items():
         for k, x in rows[i].items():

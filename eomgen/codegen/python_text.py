@@ -86,7 +86,6 @@ class _NumpyPrinter:
 
 
 def _print_pair_node(call: PairCall, operands: Sequence[str]) -> str:
-    """A node of a sum over pairs."""
     name = f"pairs_{call.function.name}"
     if call.part == "given":
         return f"[{', '.join(operands)}]"

@@ -374,7 +374,6 @@ def _loads(terms: ForceTerms) -> list[MarkerLoad | CoordinateLoad]:
 
 
 def _replaced(kinematics: Kinematics, mapping: Mapping[Expr, Expr]) -> Kinematics:
-    """Other parts of the entries of the loads."""
     flat = [e for terms in kinematics.forces for load in _loads(terms) for e in entries_of(load)]
     values = iter(substitute(flat, mapping) if mapping else flat)
     result = []

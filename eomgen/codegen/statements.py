@@ -397,7 +397,6 @@ def cut(
 
 
 def _together(i: int, second: Mapping[int, int]) -> tuple[int, ...]:
-    """A statement, with the other of its pair."""
     return (i, second[i]) if i in second else (i,)
 
 

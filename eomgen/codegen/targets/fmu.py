@@ -130,7 +130,6 @@ def find_exact(program: Program) -> list[bool]:
 
 
 def _rate_unit(unit: str) -> str:
-    """The unit of a rate."""
     if not unit:
         return ""
     if unit == "1":

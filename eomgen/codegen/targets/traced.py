@@ -160,7 +160,6 @@ def _require_traceable(program: Program, library: str) -> None:
 
 
 def _numbers(values: Any) -> str:
-    """The text of a tuple of numbers."""
     texts = ['float("nan")' if x is None or x != x else repr(float(x)) for x in values or ()]
     return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
 
