@@ -270,6 +270,9 @@ class SharedEnergy(Contact):
         return vec.sub(about, vec.cross(arm, self.aside(view)))
 
 
+EQUAL = 0.1  #: part of the depth over which an end becomes as deep as what is between both
+
+
 def beside_ends(
     view: View, rod: tuple[Marker, Expr], solid: tuple[Marker, Vec3, Vec3], depth: Expr, radius: Expr
 ) -> Expr:
@@ -278,6 +281,7 @@ def beside_ends(
     It is the product of 1 - (e / d)^2, not below 0, of both ends, with their depths e in the cuboid, given by the place
     of a marker from its centre and half lengths: with that of an end the energy is the law's at the end and far from
     it, and nowhere more than that of the deeper, of laws that are linear or stiffen.  Each end that touches counts.
+    Over the last part EQUAL of the depth it falls to 0 with a slope of 0, so that the force does not jump at e = d.
     """
     graph, (marker, half), (other, centre, halves) = view.graph, rod, solid
     larger = partial(graph.apply, "max")
@@ -294,7 +298,8 @@ def beside_ends(
 
     def beside(end: Expr) -> Expr:
         part = graph.apply("min", 1.0, larger(0.0, radius - gap(end)) / where(deep, depth, 1.0))
-        return 1.0 - part * part
+        near = larger(0.0, (part - (1.0 - EQUAL)) / EQUAL)
+        return 1.0 - part * part - 2.0 * EQUAL * (near * near * (1.0 - near))
 
     deep = graph.apply("lt", 0.0, depth)
     return where(deep, beside(half) * beside(-half), 1.0)

@@ -294,6 +294,20 @@ def test_both_ends_of_a_capsule_across_an_edge() -> None:
     check_slopes(mod, x)
 
 
+def test_the_force_does_not_jump_where_an_end_becomes_as_deep_as_an_edge() -> None:
+    """A capsule turns over an edge of a cuboid until it lies flat on a face, and on."""
+    m, (a, b) = flying(2)
+    edge, half, rise = 0.02, 0.1, 0.04
+    m.contacts("touch", {**BLOCK, "edge_radius": edge, "on": a}, {**ROD, "length": 2 * half, "on": b}, ELASTIC)
+    mod, forces = m.compile(target="numpy"), []
+    for way in (-1e-7, 1e-7):
+        turn = Rotation.from_rotvec((0, np.pi / 4 + way, 0)) * Rotation.from_rotvec((0, 3 * np.pi / 4, 0))
+        along = turn.apply((0, 0, 1.0))
+        place = (np.array(BLOCK["size"]) / 2 - edge) * (1, 0, 1) + rise / np.sqrt(2) * np.array([1, 0, 1])
+        forces.append(-mod.bias(0.0, state(mod, [(0, 0, 0), place + 0.3 * half * along], [Rotation.identity(), turn])))
+    assert np.abs(forces[1] - forces[0]).max() < 1e-4 * np.abs(forces[0]).max()
+
+
 @pytest.mark.parametrize("part", [0.02, 0.5, 0.95])
 def test_a_corner_along_a_capsule(part: float) -> None:
     """From its middle over its end the energy is continuous, that of one law at both, and never more."""
