@@ -129,7 +129,7 @@ def polygons(corners: int) -> eg.Model:
 def seconds_to_compile(sources: dict[str, str]) -> float:
     """Seconds of a processor for the files of contacts, with the flags of a module; the least of three."""
     with tempfile.TemporaryDirectory() as folder:
-        headers = {name: read_header(name) for name in ("eomgen.h", "eomgen_real.h")}
+        headers = {name: read_header(name) for name in ("eomgen.h", "eomgen_real.h", "eomgen_pairs.h")}
         for name, text in {**headers, **sources}.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         command = [*find_compiler().command, *our_flags(), "-o", "made.o", "-c"]
@@ -152,7 +152,7 @@ def track_contacts(report: Report, quick: bool) -> None:
         equations = model.derive()
         contacts = pair_files(pipeline.build(equations, "c", ["rhs", "jacobian", "meeting_time", "near_pairs"]))
         seconds = seconds_to_compile({**emit_c(pipeline.build(equations, "c", ["energy"])), **contacts})
-        mod = equations.compile(kernels=[k.name for k in KERNELS if not k.late and k.name != "jacobian"])
+        mod = equations.compile(kernels=[k.name for k in KERNELS if not k.lazy and k.name != "jacobian"])
         x, out = moving(mod), np.empty(mod.n_x)
         call = timed(lambda mod=mod, x=x, out=out: mod.rhs(0.0, x, out=out), process_time)
         best = min(call(20) for _ in range(40))
