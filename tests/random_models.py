@@ -528,8 +528,11 @@ class Made:
         r = poses[:, :3, 3] / self.L
         return R, r - np.array([turn @ A.position for turn, A in zip(R, frames, strict=True)])
 
-    def motion(self, module: Any, x: np.ndarray) -> SimpleNamespace:
-        """Of all bodies, by differences of poses along the module's rhs, as the bodies were made, in SI units."""
+    def motion(self, module: Any, x: np.ndarray, moves: bool = True) -> SimpleNamespace:
+        """Of all bodies, by differences of poses along the module's rhs, as the bodies were made, in SI units.
+
+        A state that is not on the constraints does not move: it has no accelerations.
+        """
         n, v_n = module.n_q, module.n_v
         kinds = (module.metadata[key] for key in ("coordinate_kinds", "velocity_kinds"))
         q_size, v_size = (np.array([self.L if kind == "length" else 1.0 for kind in many]) for many in kinds)
@@ -541,7 +544,7 @@ class Made:
             return here
 
         q, v = x[:n] / q_size, x[n : n + v_n] / v_size
-        a = self.call(module.rhs, TIME, x)[n : n + v_n] / v_size
+        a = self.call(module.rhs, TIME, x)[n : n + v_n] / v_size if moves else np.zeros(v_n)
         N = basis(module, q)
         q_dot = N @ v
         found = judges.Bodies(SimpleNamespace(poses=poses), q, q_dot, TIME)

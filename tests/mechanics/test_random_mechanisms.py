@@ -518,13 +518,13 @@ def dressed(one: Made, x: np.ndarray, module: Any, clothes: Clothes) -> tuple[Ma
     for name, value in zip(module.x_names[module.n_q + module.n_v :], x[module.n_q + module.n_v :], strict=True):
         y[other.x_names.index(made.name(name))] = value
     for _ in range(6 if one.recipe.closing else 0):  # the joint that was cut may have coordinates now
-        here = made.motion(other, y)
+        here = made.motion(other, y, moves=False)
         turn = [judges.vee((R @ Q.T)[None])[0] for R, Q in zip(goal.R, here.R, strict=True)]
         gap = np.concatenate([np.ravel(turn), np.ravel(goal.r - here.r)])
         y[:n] += basis(other, y[:n]) @ (here.v_size * np.linalg.lstsq(jacobian_of(here), gap, rcond=None)[0])
         for k in (k for k, name in enumerate(other.q_names) if name.endswith("_e0")):
             y[k : k + 4] /= np.linalg.norm(y[k : k + 4])
-    here, twists = made.motion(other, y), np.concatenate([goal.w.ravel(), goal.r_dot.ravel()])
+    here, twists = made.motion(other, y, moves=False), np.concatenate([goal.w.ravel(), goal.r_dot.ravel()])
     y[n : n + other.n_v] = here.v_size * np.linalg.lstsq(jacobian_of(here), twists, rcond=None)[0]
     return made, other, y
 
