@@ -11,6 +11,7 @@ import numpy as np
 from ..base.files import save_figure
 from ..errors import MissingDependencyError, bad_file, incomplete
 from ..expr.notation import Notation
+from ..model.quantities import Measure
 from .options import OPTIONS, Names, require_folder
 
 if TYPE_CHECKING:
@@ -32,12 +33,12 @@ def require_plotting(file: Path, option: str = "--plot") -> None:
 
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
     """Pairs of outputs that are two coordinates of one marker's position."""
-    places: dict[int, tuple[Any, int]] = {
-        mechanism.graph.symbol(symbol).id: ((quantity.marker, quantity.origin, quantity.axes), quantity.axis)
+    places: dict[int, tuple[Any, str]] = {
+        mechanism.graph.symbol(symbol).id: ((quantity.marker, quantity.origin, quantity.axes), quantity.part)
         for symbol, quantity in mechanism.quantities.items()
-        if quantity.level == 0
+        if quantity.measure is Measure.POSITION
     }
-    by_marker: dict[Any, dict[int, str]] = {}
+    by_marker: dict[Any, dict[str, str]] = {}
     for output in mechanism.outputs:
         if output.expression.id in places:
             marker, axis = places[output.expression.id]

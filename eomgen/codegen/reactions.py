@@ -87,9 +87,9 @@ def refuse_undetermined(
     for name, quantity in mechanism.reaction_quantities.items():
         symbols = motion.derived_symbols(mechanism, {name})
         if _depends(substitute([graph.symbol(name)], symbols), values, open_):
-            part = f"reaction({quantity.of}).{quantity.part}" if quantity.part else f"multiplier({quantity.of})"
+            part = f"reaction({quantity.element}).{quantity.part}" if quantity.part else name
             message = f"{part} is undetermined: rigid bodies do not determine how the joints of a loop share this load"
-            problems.append(mechanism.problem(quantity.path, message, _REMEDY, "EG-UNDETERMINED"))
+            problems.append(mechanism.problem(quantity.place, message, _REMEDY, "EG-UNDETERMINED"))
     for force in mechanism.forces:
         if force.by_reaction and _depends(laws.get(force.name, ()), values, open_):
             message = f"the load of joint {getattr(force, 'joint', '')!r} is undetermined: rigid bodies do not "
@@ -235,7 +235,7 @@ def refuse_without_inertia(kinematics: Kinematics, moved: Sequence[str], laws: L
     if not moved:
         return
     mechanism = kinematics.mechanism
-    places = [q.path for q in mechanism.reaction_quantities.values() if not q.path.startswith("forces.")]
+    places = [q.place for q in mechanism.reaction_quantities.values() if not q.place.startswith("forces.")]
     places += [f"constraints.{s.constraint.name}" for s in mechanism.switched if s.constraint is not None]
     place, verb = (f"forces.{' and '.join(laws)}", "depend") if laws else (places[0], "depends")
     message = f"{verb} on reactions, and motion of {', '.join(moved)} has no inertia"
@@ -263,7 +263,7 @@ def refuse_redundant(
     paths = [f"forces.{name}" for name, laws in laws.items() if shared & symbols_of(laws)]
     for name, quantity in quantities.items():
         seen = substitute([kinematics.graph.symbol(name)], motion.derived_symbols(mechanism, {name}))
-        paths += [quantity.path] if shared & symbols_of(seen) else []
+        paths += [quantity.place] if shared & symbols_of(seen) else []
     message = "depends on the reaction of a joint, and reactions are not unique: "
     message += f"{', '.join(mobility.redundant)} follow from the other constraints"
     remedy = "release only these rows by joints with more freedom, or take a law without reactions"
@@ -484,6 +484,6 @@ def _row(kinematics: Kinematics, name: str, labels: Sequence[str], laws: Laws) -
         return of_joint[0]
     message = f"there is no equation {name!r}" if of_joint else f"{name.partition('.')[0]!r} has no equation"
     quantities = kinematics.mechanism.reaction_quantities
-    path = next(q.path for q in quantities.values() if not q.part and q.of == name)
+    path = next(q.place for q in quantities.values() if not q.part and q.element == name)
     remedy = f"there are: {', '.join(of_joint or labels) or 'none'}; joints have equations where they close a loop"
     raise ModelError([kinematics.mechanism.problem(path, message, remedy, "EG-NAME-UNKNOWN")])

@@ -24,6 +24,7 @@ from ..expr.notation import rate_of
 from ..expr.records import Record
 from ..expr.vectors import Vec3
 from ..model.mechanism import JointSpec, Mechanism
+from ..model.quantities import REACTIONS
 from .motion import MarkerMotion
 from .topology import MotionSymbols
 from .tree import Poses, Turns
@@ -269,7 +270,7 @@ class _Written(NamedTuple):
 def refuse_unusable(mechanism: Mechanism, motion: MarkerMotion, rows: Sequence[Row]) -> None:
     """Refuse equations that hold what has no rate here, or that are not linear in velocities."""
     by_name = {row.label.partition(".")[0]: row for row in rows}
-    requested = mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()
+    requested = {n for n, q in mechanism.quantities.items() if q.element and q.measure not in REACTIONS}
     problems: list[Problem] = []
     for equation in mechanism.constraints:
         if isinstance(equation, Equation):

@@ -15,17 +15,8 @@ from ..expr.differentiate import jvp
 from ..expr.spatial import Twist
 from ..expr.tensors import add_matrices, eliminate, rotate_symmetric, shift_tensor
 from ..expr.vectors import Mat3, Vec3
-from ..model.mechanism import STATE_RATE, JointSpec, Mechanism
-from ..model.quantities import (
-    ANGULAR_MOMENTUM,
-    INERTIA,
-    MASS,
-    MOMENTUM,
-    TURNING,
-    Quantity,
-    ReactionQuantity,
-    WrenchQuantity,
-)
+from ..model.mechanism import JointSpec, Mechanism
+from ..model.quantities import ANGLES, REACTIONS, SUMS, TURNING, Measure, Quantity
 from .topology import MotionSymbols
 from .tree import Link, Poses
 
@@ -45,7 +36,7 @@ class Placed(Protocol):
     def coordinate(self, name: str) -> tuple[Expr, Expr]: ...
 
 
-def part_of_reaction(motion: Placed, spec: JointSpec, quantity: ReactionQuantity) -> Expr:
+def part_of_reaction(motion: Placed, spec: JointSpec, quantity: Quantity) -> Expr:
     """The part, in symbols of the joint's wrench along the axes of S."""
     wrench = [reaction_symbol(motion.graph, spec.name, k) for k in range(6)]
     force, moment = force_and_moment(motion, spec, wrench)
@@ -87,20 +78,21 @@ def _spanned(graph: Graph, directions: Sequence[Vec3], work: Sequence[Expr]) -> 
 # -- loads of force elements on bodies ---------------------------------------------------------------------------------
 
 
-def part_exerted(view: View, force: Force, quantity: WrenchQuantity) -> Expr | str:
+def part_exerted(view: View, force: Force, quantity: Quantity) -> Expr | str:
     """The part: forces add up, moments are taken about the origin of the marker; or why there is none."""
     total, moment, acts = vec.zero(view.graph), vec.zero(view.graph), False
-    here = view.position(quantity.on)
+    assert quantity.marker is not None
+    here = view.position(quantity.marker)
     for load in force.loads(view):
         if not isinstance(load, MarkerLoad):
             return f"acts along the coordinate {load.coordinate!r}"
-        if load.marker.body == quantity.on.body:
+        if load.marker.body == quantity.marker.body:
             acts = True
             arm = vec.sub(view.position(load.marker), here)
             total = vec.add(total, load.force)
             moment = vec.add(moment, vec.add(load.torque, vec.cross(arm, load.force)))
     if not acts:
-        return f"exerts nothing on {quantity.on.label.partition('.')[0]}"
+        return f"exerts nothing on {quantity.marker.label.partition('.')[0]}"
     if quantity.part == "size":
         return beyond_zero(vec.dot(total, total), sqrt)
     result = moment if quantity.part.startswith("m") else total
@@ -362,20 +354,22 @@ class MarkerMotion:
 
     def _sum(self, quantity: Quantity) -> Expr:
         """A sum over all bodies, or the motion of their centre of mass."""
-        total, k, marker = self.momentum, quantity.axis, quantity.marker
-        if quantity.level == MASS:
+        total, measure, marker = self.momentum, quantity.measure, quantity.marker
+        places = ["xyz".index(axis) for axis in quantity.part]
+        if measure is Measure.MASS:
             return total.mass
-        if quantity.level == MOMENTUM:
-            return total.linear[k]
-        if quantity.level == ANGULAR_MOMENTUM:
-            return (total.angular if marker is None else total.angular_about(self.position(marker)))[k]
-        if quantity.level == INERTIA:
+        if measure is Measure.INERTIA:
             tensor = total.inertia if marker is None else total.inertia_about(self.position(marker))
-            i, j = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))[k]
-            return tensor[i][j]
-        if quantity.level == 2:
-            return jvp(list(total.velocity), self.state.along)[k]
-        return (total.velocity if quantity.level == 1 else total.centre)[k]
+            return tensor[places[0]][places[1]]
+        if measure is Measure.MOMENTUM:
+            vector = total.linear
+        elif measure is Measure.ANGULAR_MOMENTUM:
+            vector = total.angular if marker is None else total.angular_about(self.position(marker))
+        elif measure is Measure.ACCELERATION:
+            return jvp(list(total.velocity), self.state.along)[places[0]]
+        else:
+            vector = total.velocity if measure is Measure.VELOCITY else total.centre
+        return vector[places[0]]
 
     def derived_symbols(self, mechanism: Mechanism, used: set[str]) -> dict[Expr, Expr]:
         """What cut joints' coordinates and marker quantities stand for, as a substitution, for the symbols ``used``."""
@@ -393,32 +387,31 @@ class MarkerMotion:
                 mapping[self.graph.symbol(f"{name}_dot")] = jvp([value], self.state.along)[0]
         for name, quantity in mechanism.quantities.items():
             if name in used:
-                mapping[self.graph.symbol(name)] = self._quantity(quantity)
-        for name in mechanism.reaction_quantities.keys() & used:
-            result = self._joint_wrench(mechanism, mechanism.reaction_quantities[name])
-            if result != self.graph.symbol(name):
-                mapping[self.graph.symbol(name)] = result
+                result = self._quantity(mechanism, name, quantity)
+                if result != self.graph.symbol(name):
+                    mapping[self.graph.symbol(name)] = result
         for name in self.known_reactions.keys() & used:
             mapping[self.graph.symbol(name)] = self.known_reactions[name]
-        for name in (mechanism.element_quantities.keys() | mechanism.wrench_quantities.keys()) & used:
-            mapping[self.graph.symbol(name)] = self._of_element(mechanism, name)
         return mapping
 
-    def _joint_wrench(self, mechanism: Mechanism, quantity: ReactionQuantity) -> Expr:
+    def _quantity(self, mechanism: Mechanism, name: str, quantity: Quantity) -> Expr:
+        if not quantity.element:
+            return self._motion(quantity)
+        return (self._joint_wrench if quantity.measure in REACTIONS else self._of_element)(mechanism, name, quantity)
+
+    def _joint_wrench(self, mechanism: Mechanism, name: str, quantity: Quantity) -> Expr:
         """A part of a reaction in symbols of the joint's wrench, or a multiplier; their values once they are known."""
-        if quantity.part:
-            spec = next(spec for spec in mechanism.joints if spec.name == quantity.of)
+        result, mapping = self.graph.symbol(name), dict[Expr, Expr]()
+        if quantity.measure is Measure.REACTION:
+            spec = next(spec for spec in mechanism.joints if spec.name == quantity.element)
             result = part_of_reaction(self, spec, quantity)
             mapping = self.derived_symbols(mechanism, symbols_of([result]))
-        else:
-            result, mapping = self.graph.symbol(f"multiplier({quantity.of})"), {}
         known = mapping | {self.graph.symbol(name): value for name, value in self.known_reactions.items()}
         return substitute([result], known)[0]
 
-    def _of_element(self, mechanism: Mechanism, name: str) -> Expr:
+    def _of_element(self, mechanism: Mechanism, name: str, quantity: Quantity) -> Expr:
         """What a force element does, in terms of the tree; refused if it depends on itself."""
-        exerted = mechanism.wrench_quantities.get(name)
-        quantity, element = mechanism.element_quantities[name] if exerted is None else ("", exerted.element)
+        measure, element = quantity.measure, quantity.element
         if name in self._open:
             way = " -> ".join([*self._open[self._open.index(name) :], name])
             remedy = "let one of the laws depend on positions and velocities instead"
@@ -426,22 +419,22 @@ class MarkerMotion:
                 [mechanism.problem(f"forces.{element}", f"algebraic loop between laws: {way}", remedy, "EG-CIRCLE")]
             )
         force = next(force for force in mechanism.forces if force.name == element)
-        if exerted is not None:
-            result = self._exerted(mechanism, force, exerted)
-        elif quantity.startswith(STATE_RATE):
+        if measure is Measure.EXERTED:
+            result = self._exerted(mechanism, force, quantity)
+        elif measure is Measure.STATE_RATE:
             if element not in self._state_rates:  # of all at once: one sum over pairs gives many
                 self._state_rates[element] = force.state_rates(self)
-            result = self._state_rates[element][int(quantity.removeprefix(STATE_RATE))]
-        elif quantity == "power" or (measured := force.measured(self)) is None:
+            result = self._state_rates[element][int(quantity.part)]
+        elif measure is Measure.POWER or (measured := force.measured(self)) is None:
             result = force.power(self)
         else:
-            result = {"length": measured.value, "rate": measured.rate, "force": measured.force}[quantity]
+            result = {"length": measured.value, "rate": measured.rate, "force": measured.force}[measure.word]
         self._open.append(name)
         mapping = self.derived_symbols(mechanism, symbols_of([result]))
         self._open.pop()
         return substitute([result], mapping)[0] if mapping else result
 
-    def _exerted(self, mechanism: Mechanism, force: Force, quantity: WrenchQuantity) -> Expr:
+    def _exerted(self, mechanism: Mechanism, force: Force, quantity: Quantity) -> Expr:
         result = part_exerted(self, force, quantity)
         if force.is_rigid:
             message = f"the contacts {force.name!r} have the law rigid, which exerts impulses, not forces"
@@ -449,50 +442,51 @@ class MarkerMotion:
                 "read run.contact_forces.on(BODY) of a run by method moreau with contact_forces=True, means of steps; "
                 "or give a normal law with a stiffness"
             )
-            raise ModelError([mechanism.problem(quantity.path, message, remedy, "EG-UNSUPPORTED")])
+            raise ModelError([mechanism.problem(quantity.place, message, remedy, "EG-UNSUPPORTED")])
         if isinstance(result, str):
             remedy = f"give a body on which it acts; power({force.name}) is known of every element"
             raise ModelError(
-                [mechanism.problem(quantity.path, f"the element {force.name!r} {result}", remedy, "EG-UNSUPPORTED")]
+                [mechanism.problem(quantity.place, f"the element {force.name!r} {result}", remedy, "EG-UNSUPPORTED")]
             )
         return result
 
-    def _quantity(self, quantity: Quantity) -> Expr:
+    def _motion(self, quantity: Quantity) -> Expr:
         """Motion of a marker, or a sum over all bodies."""
-        if quantity.level not in (0, 1, 2, *TURNING):
+        measure = quantity.measure
+        if measure in SUMS:
             return self._sum(quantity)
-        if quantity.axis == 4:
+        if measure in (Measure.DISTANCE, Measure.DISTANCE_RATE):
             return self._distance(quantity)
-        if quantity.axis == 3 and quantity.marker is not None:
+        if measure in ANGLES and quantity.marker is not None:
             # it wraps only where the motion is not plane
             angle, rate, _ = self.turn(quantity.origin or self._ground, quantity.marker)
-            return rate if quantity.level else angle
-        result = self._vector(quantity.level, quantity.marker)
+            return rate if measure.order else angle
+        result = self._vector(measure, quantity.marker)
         if quantity.origin is not None:
-            result = vec.sub(result, self._vector(quantity.level, quantity.origin))
+            result = vec.sub(result, self._vector(measure, quantity.origin))
         if quantity.axes is not None:
             result = vec.transpose_times(self.rotation(quantity.axes), result)
-        return result[quantity.axis]
+        return result["xyz".index(quantity.part)]
 
     def may_wrap(self, quantity: Quantity) -> bool:
         """Whether it is an angle between axes that do not stay in line, which is not defined everywhere."""
-        if quantity.axis != 3 or quantity.level > 0 or quantity.marker is None:
+        if quantity.measure is not Measure.ANGLE or quantity.marker is None:
             return False
         return not self.turn(quantity.origin or self._ground, quantity.marker)[2]
 
-    def _vector(self, level: int, marker: Marker | None) -> Vec3:
+    def _vector(self, measure: Measure, marker: Marker | None) -> Vec3:
         """The motion of a marker's origin, its angular motion, or the motion of the centre of mass of all bodies."""
         if marker is None:
-            x, y, z = (self._sum(Quantity(None, level, k)) for k in range(3))
+            x, y, z = (self._sum(Quantity(measure, axis)) for axis in "xyz")
             return (x, y, z)
-        if level in TURNING:
-            return self.turning_of(marker, level in TURNING[1::2], level in TURNING[2:])
-        return (self.position, self.velocity, self.acceleration)[level](marker)
+        if measure in TURNING:
+            return self.turning_of(marker, measure in TURNING[1::2], measure in TURNING[2:])
+        return (self.position, self.velocity, self.acceleration)[measure.order or 0](marker)
 
     def _distance(self, quantity: Quantity) -> Expr:
         """The distance of two markers, or its rate."""
         start = quantity.origin or self._ground
-        place, velocity = (self._vector(level, quantity.marker) for level in (0, 1))
+        place, velocity = (self._vector(m, quantity.marker) for m in (Measure.POSITION, Measure.VELOCITY))
         reach = vec.sub(place, self.position(start))
         length = sqrt(vec.dot(reach, reach))
-        return vec.dot(reach, vec.sub(velocity, self.velocity(start))) / length if quantity.level else length
+        return vec.dot(reach, vec.sub(velocity, self.velocity(start))) / length if quantity.measure.order else length

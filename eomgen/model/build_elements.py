@@ -18,7 +18,8 @@ from ..expr.core import symbols_of
 from ..expr.records import Record
 from .checks import check_keys, check_names
 from .description import DescribedEntry, Description, items
-from .mechanism import STATE_RATE, FirstOrderState, JointSpec
+from .mechanism import FirstOrderState, JointSpec
+from .quantities import Measure, Quantity
 from .requirements import Requirements
 from .sympy_face import name_of
 from .values import Reader, take_coordinates_latex, take_latex
@@ -193,10 +194,10 @@ def check_turns(constraints: Sequence[Constraint], requirements: Requirements) -
 
 def element_states(
     reader: Reader, entries: list[DescribedEntry]
-) -> tuple[tuple[FirstOrderState, ...], dict[str, tuple[str, str]]]:
+) -> tuple[tuple[FirstOrderState, ...], dict[str, Quantity]]:
     """Take in the states of force elements, which begin at 0: the states, and what the symbols of their rates are."""
     states: list[FirstOrderState] = []
-    rates: dict[str, tuple[str, str]] = {}
+    rates: dict[str, Quantity] = {}
     for entry in entries:
         kind: Any = entry.values.get("type")
         known = isinstance(kind, str) and kind in FORCES and isinstance(entry.name, str)
@@ -204,7 +205,7 @@ def element_states(
             name = f"{entry.name}_{suffix}"
             if reader.names.declare("state", name, entry.path):
                 rate = f"rate of {name}"
-                rates[rate] = (f"{STATE_RATE}{k}", str(entry.name))
+                rates[rate] = Quantity(Measure.STATE_RATE, str(k), element=str(entry.name))
                 states.append(FirstOrderState(name, reader.graph.symbol(rate), unit, f"state of {entry.name}"))
     return tuple(states), rates
 

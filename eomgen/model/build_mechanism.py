@@ -58,7 +58,7 @@ from .fields import BODY, FIXED_STEP, MODEL, SIMULATION
 from .fields import GROUND as GROUND_FIELDS
 from .mechanism import Body, Mechanism, Presentation, RunDefaults, Simulation
 from .names import Namespace, fault_of_model_name
-from .quantities import SUMS, ReactionQuantity, WrenchQuantity
+from .quantities import OF_ELEMENTS, SUMS, Measure
 from .sympy_face import in_order, name_of
 from .values import Reader
 from .visit import undotted
@@ -156,7 +156,6 @@ def build(description: Description) -> Mechanism:
     initial = begun | {s.state: graph.one if s.closed else graph.zero for s in switched}
     initial |= {name: value for name, value in starts.items() if name in moving}
     others = {name: value for name, value in starts.items() if name not in moving}
-    exerted, reactions = _wrenches(reader)
     described = len(bodies)
     bodies, joints = (*bodies, *reader.added[0]), (*joints, *reader.added[1])
     return Mechanism(
@@ -172,11 +171,7 @@ def build(description: Description) -> Mechanism:
         states=(*states, *element_values, *(switch.discrete_state for switch in switched)),
         clocks=clocks,
         events=events,
-        quantities=dict(reader.quantities),
-        element_quantities={str(a): (a.name, a.of) for a in reader.requested if not a.part and not a.is_reaction}
-        | state_rates,
-        wrench_quantities=exerted,
-        reaction_quantities=reactions,
+        quantities=reader.quantities | state_rates,
         independent=independent,
         lagrangian=lagrangian,
         given=raw,
@@ -251,37 +246,25 @@ def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntr
 
 def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
     """Note centres of mass and momenta asked of a mechanism without mass."""
-    requested = [name for name, q in reader.quantities.items() if q.marker is None or q.level in SUMS]
+    requested = [n for n, q in reader.quantities.items() if not q.element and (q.marker is None or q.measure in SUMS)]
     if requested and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
         what = ", ".join(name.removesuffix("()") for name in requested)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
         reader.fault("outputs", message, "a centre of mass and a momentum need mass", "EG-NO-INERTIA")
 
 
-def _wrenches(reader: Reader) -> tuple[dict[str, WrenchQuantity], dict[str, ReactionQuantity]]:
-    """The parts of what force elements exert on bodies, and of reactions and multipliers, that expressions speak of."""
-    exerted, reactions = dict[str, WrenchQuantity](), dict[str, ReactionQuantity]()
-    for requested, path in reader.requested.items():
-        axes = reader.moving(requested.axes) if requested.axes else None
-        if requested.is_reaction:
-            reactions[str(requested)] = ReactionQuantity(requested.of, requested.part, axes, path)
-        elif requested.on:
-            exerted[str(requested)] = WrenchQuantity(
-                requested.of, requested.part, reader.moving(requested.on), axes, path
-            )
-    return exerted, reactions
-
-
 def _check_path_quantities(reader: Reader, forces: tuple[Force, ...]) -> None:
     """Report faults: quantities such as ``length(k1)`` of force elements that do not act along a path."""
     known = {force.name: force for force in forces}
-    for requested, path in reader.requested.items():
-        quantity, name, on = requested.name, requested.of, requested.on
-        if name in known and known[name].is_rigid and not on:
+    for quantity in reader.quantities.values():
+        word, name, path = quantity.measure.word, quantity.element, quantity.place
+        if name not in known or word not in OF_ELEMENTS:
+            continue
+        if known[name].is_rigid:
             fault = f"the contacts {name!r} have the law rigid, which exerts impulses, not forces"
             columns = f"read the columns normal({name}) and friction({name}) of a run by method moreau, means of steps"
             reader.fault(path, fault, f"{columns}; run.contact_forces.on(BODY) has forces on bodies", "EG-UNSUPPORTED")
-        elif quantity != "power" and not on and name in known and not known[name].acts_along:
+        elif quantity.measure is not Measure.POWER and not known[name].acts_along:
             remedy = f"power({name}) is known of every element; force, length and rate of elements along a path "
             message = f"{name!r} does not act along a path"
             reader.fault(path, message, remedy + "or a coordinate, and of single contacts", "EG-UNSUPPORTED")

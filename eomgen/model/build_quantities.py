@@ -254,7 +254,7 @@ def check_resets(
 def instant(reader: Reader, path: str, value: Any) -> Expr:
     """An expression of what is known of a state without solving for accelerations."""
     expression = reader.expression(path, value, OUTPUT)
-    for name, what in names_of_acceleration(reader.names, symbols_of([expression])):
+    for name, what in names_of_acceleration(reader, symbols_of([expression])):
         remedy = (
             "allowed are t, parameters, inputs, coordinates, velocities, states, positions and velocities of markers"
         )

@@ -112,7 +112,7 @@ def _check_bindings(reader: Reader, check: _Check) -> dict[str, list[int]]:
     Of instances within others those are not judged that take in what is wrong with the outer one.
     """
     wrong: dict[str, list[int]] = {}
-    quantities, requested, count = dict(reader.quantities), dict(reader.requested), len(reader.expressions)
+    quantities, count = dict(reader.quantities), len(reader.expressions)
     for one in sorted(reader.description.bindings, key=lambda one: one.instance.count(".")):
         if any(one.instance.startswith(f"{outer}.") for outer in wrong):
             continue
@@ -122,7 +122,7 @@ def _check_bindings(reader: Reader, check: _Check) -> dict[str, list[int]]:
             reader.fault(one.path, message, remedy, "EG-DIMENSION")
         if reader.faults.under(one.path):
             wrong.setdefault(one.instance, []).append(expression.id)
-    reader.quantities, reader.requested = quantities, requested  # its places in the instance ask for what it needs
+    reader.quantities = quantities  # its places in the instance ask for what it needs
     del reader.expressions[count:]
     return wrong
 
@@ -188,10 +188,8 @@ def _names(reader: Reader, units: Mapping[str, Unit], joints: tuple[JointSpec, .
                 dimension = SPEED if velocity.kind == "length" else SPIN
                 result |= {name: Known(dimension), f"{name}_dot": Known(dimension.times(TIME, -1))}
     for name, quantity in reader.quantities.items():
-        result[name] = Known(quantity.dimension)
-    result |= {
-        str(requested): Known(requested.dimension) for requested in reader.requested if requested.dimension is not None
-    }
+        if quantity.dimension is not None:
+            result[name] = Known(quantity.dimension)
     return result | {f"{name}()": Known(ENERGY) for name in ENERGIES}
 
 

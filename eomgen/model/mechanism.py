@@ -24,7 +24,7 @@ from ..expr.core import LEAVES, Expr, Graph, reachable
 from ..expr.records import Record
 from ..expr.vectors import Mat3, Vec3
 from .description import as_written, place_of
-from .quantities import Quantity, ReactionQuantity, WrenchQuantity
+from .quantities import REACTIONS, Quantity
 from .requirements import Requirement
 
 if TYPE_CHECKING:
@@ -122,9 +122,6 @@ class Output(Record):
     unit: str = ""
     doc: str = ""
     of_velocities: bool = False  #: whether it is written with a velocity, even one that is always 0
-
-
-STATE_RATE = "state "  #: begins the quantity of an element that is the rate of its state of a number
 
 
 class FirstOrderState(Record):
@@ -271,10 +268,7 @@ class Mechanism(Record):
     states: tuple[FirstOrderState, ...] = ()
     clocks: tuple[Clock, ...] = ()
     events: tuple[Event, ...] = ()
-    quantities: Mapping[str, Quantity] = field(default_factory=dict)
-    element_quantities: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: symbol -> quantity, element
-    wrench_quantities: Mapping[str, WrenchQuantity] = field(default_factory=dict)  #: by symbol
-    reaction_quantities: Mapping[str, ReactionQuantity] = field(default_factory=dict)  #: by symbol
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)  #: of markers, elements, joints, by symbol
     independent: tuple[str, ...] = ()
     given: GivenEquations | None = None  #: instead of bodies
     lagrangian: Lagrangian | None = None  #: of which these are the derivatives, for reading
@@ -297,6 +291,11 @@ class Mechanism(Record):
     def sampled_names(self) -> set[str]:
         """States that clocks alone change, and the counters of the clocks."""
         return {name for clock in self.clocks for name in (*clock.states, clock.counter)}
+
+    @property
+    def reaction_quantities(self) -> dict[str, Quantity]:
+        """Parts of reactions, and multipliers, that expressions speak of, by symbol."""
+        return {name: q for name, q in self.quantities.items() if q.measure in REACTIONS}
 
     @property
     def bare(self) -> bool:

@@ -17,18 +17,7 @@ from ..errors import ExpressionError
 from ..expr.core import Expr, Graph, symbols_of
 from ..expr.texts import quoted
 from .description import Faults
-from .quantities import (
-    ACCELERATIONS,
-    COM,
-    ONE_OR_TWO,
-    QUANTITIES,
-    TOTALS,
-    TURNING,
-    VELOCITIES,
-    Named,
-    Quantity,
-    call_of,
-)
+from .quantities import ANGLES, COM, PAIRS, TOTALS, TURNING, Named, Quantity, call_of
 
 #: Arguments that a function of any number of them takes at most.
 MOST = 64
@@ -159,13 +148,13 @@ _RATES_OF = {
 ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
 
 
-def names_of_acceleration(names: Namespace, used: Iterable[str]) -> Iterator[tuple[str, str]]:
+def names_of_acceleration(reader: Any, used: Iterable[str]) -> Iterator[tuple[str, str]]:
     """Those of the symbols ``used`` that are known only when accelerations are, and what they are."""
     prefixes = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
     prefixes["rate of a state"] = "rate of a state"
     for name in sorted(used):
-        what, result = prefixes.get(names.kinds.get(name, "")), Named.parse(name)
-        if result is not None and result.level in ACCELERATIONS:
+        what, quantity = prefixes.get(reader.names.kinds.get(name, "")), reader.quantities.get(name)
+        if quantity is not None and quantity.measure.order == 2:
             what = "acceleration"
         if what is not None:
             yield name, what
@@ -266,7 +255,7 @@ class Scope:
         elif kind is None and name in ENERGIES and self.level >= OUTPUT:
             return self.graph.symbol(f"{name}()")
         elif kind is None and name in TOTALS and self.level >= LAW:
-            self.reader.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
+            self.reader.quantities[f"{name}()"] = Quantity(*TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:
             known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
@@ -287,7 +276,7 @@ class Scope:
         if f"{self.names.places[output]}.expression" in self.reader.of_velocities:
             self.reader.of_velocities.add(self.path)
         used = symbols_of([result]) if self.level < OUTPUT else set()
-        late = [f"the {what} {name!r}" for name, what in names_of_acceleration(self.names, used)]
+        late = [f"the {what} {name!r}" for name, what in names_of_acceleration(self.reader, used)]
         for what in (*late, *(repr(energy) for energy in sorted(ENERGIES) if f"{energy}()" in used)):
             message = f"the output {output!r} depends on {what}, which cannot be used here"
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
@@ -302,24 +291,24 @@ class Scope:
             else:
                 self.reader.ask(named, self.path)
             return self.graph.symbol(str(named))
-        level, axis = QUANTITIES[named.name]
-        if self.level < LAW or (self.level < OUTPUT and level in ACCELERATIONS):
+        measure, part = named.measured
+        if self.level < LAW or (self.level < OUTPUT and measure.order == 2):
             self._refuse(str(named), "motion of a marker" if self.level < LAW else "acceleration of a marker")
             return self.graph.symbol(str(named))
-        if level in VELOCITIES:
+        if measure.order == 1:
             self.reader.of_velocities.add(self.path)
         seen = named
-        if axis == 4 and named.origin == COM:  # a distance is the same from either end
+        if named.name in PAIRS[2:] and named.origin == COM:  # a distance is the same from either end
             seen = named._replace(of=named.origin, origin=named.of)
         of_all = COM if COM not in self.reader.bodies else None
-        if seen.of == of_all and (named.name in ONE_OR_TWO or named.level in TURNING):
+        if seen.of == of_all and measure in (*ANGLES, *TURNING):
             raise ExpressionError("the centre of mass of all bodies has no rotation", 0, "give a marker of a body")
         point = None if seen.of == of_all else self.marker(seen.of)
         if of_all in (seen.origin, seen.axes):
             remedy = "give a marker of a body here; com can be a marker of distance() and the first of x()"
             raise ExpressionError("the centre of mass of all bodies is no marker", 0, remedy)
         origin, axes = (self.marker(label) if label else None for label in (seen.origin, seen.axes))
-        self.reader.quantities[str(named)] = Quantity(point, level, axis, origin, axes)
+        self.reader.quantities[str(named)] = Quantity(measure, part, point, origin, axes)
         return self.graph.symbol(str(named))
 
     def _refuse(self, name: str, kind: str) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from enum import Enum
 from typing import NamedTuple
 
 from ..elements import dimensions
@@ -16,55 +17,75 @@ from ..elements.frames import Marker
 from ..errors import ExpressionError
 from ..expr.records import Record
 
-ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
-SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
-TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
-#: Level of a quantity -> its dimension, save for angles (axis 3).
-LEVEL_DIMENSIONS = (
-    *(dimensions.LENGTH, dimensions.SPEED, dimensions.ACCELERATION),
-    *(dimensions.INERTIA.times(dimensions.TIME, -1), dimensions.INERTIA),
-    *(dimensions.SPEED.times(dimensions.MASS), dimensions.MASS),
-    *(dimensions.SPIN, dimensions.SPIN, dimensions.SPIN_RATE, dimensions.SPIN_RATE),
-)
-#: Motion of a marker in ground axes: name -> (level 0 position, 1 velocity, 2 acceleration; axis).
-QUANTITIES: dict[str, tuple[int, int]] = {
-    prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
+_XYZ, _ONE = ("x", "y", "z"), ("",)
+#: Parts of what a force element exerts on a body; of a reaction also the size of the force across the joint's axis.
+WRENCH_PARTS = ("x", "y", "z", "mx", "my", "mz", "size")
+REACTION_PARTS = (*WRENCH_PARTS, "normal")
+
+
+class Measure(Enum):
+    """What is measured: the word with a place for the part, the parts, the dimension, how often by time.
+
+    The dimension is None where it depends on the element; the order of the mass, which does not move, is None.
+    """
+
+    POSITION = "{}", _XYZ, dimensions.LENGTH, 0
+    VELOCITY = "v{}", _XYZ, dimensions.SPEED, 1
+    ACCELERATION = "a{}", _XYZ, dimensions.ACCELERATION, 2
+    ANGLE = "angle", _ONE, dimensions.NONE, 0  #: about the z axis of another marker, or of ground
+    ANGLE_RATE = "angle_rate", _ONE, dimensions.SPIN, 1
+    DISTANCE = "distance", _ONE, dimensions.LENGTH, 0
+    DISTANCE_RATE = "distance_rate", _ONE, dimensions.SPEED, 1
+    # angular velocity and acceleration of the marker's body, in ground axes and in the marker's own
+    SPIN = "w{}", _XYZ, dimensions.SPIN, 1
+    SPIN_BODY = "w{}_body", _XYZ, dimensions.SPIN, 1
+    SPIN_RATE = "w{}_dot", _XYZ, dimensions.SPIN_RATE, 2
+    SPIN_BODY_RATE = "w{}_body_dot", _XYZ, dimensions.SPIN_RATE, 2
+    # sums over all bodies in ground axes, the first two about the marker's origin
+    ANGULAR_MOMENTUM = "angular_momentum_{}", _XYZ, dimensions.INERTIA.times(dimensions.TIME, -1), 1
+    INERTIA = "inertia_{}", ("xx", "yy", "zz", "xy", "xz", "yz"), dimensions.INERTIA, 0
+    MOMENTUM = "momentum_{}", _XYZ, dimensions.SPEED.times(dimensions.MASS), 1
+    MASS = "total_mass", _ONE, dimensions.MASS, None
+    # of a force element: along its path, and on the body of a marker
+    FORCE = "force", _ONE, None, 0
+    LENGTH = "length", _ONE, None, 0
+    RATE = "rate", _ONE, None, 1
+    POWER = "power", _ONE, dimensions.ENERGY.times(dimensions.TIME, -1), 0
+    STATE_RATE = "rate of state {}", (), None, 0
+    EXERTED = "force.{}", WRENCH_PARTS, None, 0
+    # of a joint, and of an equation of a constraint
+    REACTION = "reaction.{}", REACTION_PARTS, None, 0
+    MULTIPLIER = "multiplier", _ONE, None, 0
+
+    def __init__(self, word: str, parts: tuple[str, ...], dimension: Dimension | None, order: int | None) -> None:
+        self.word, self.parts, self.dimension, self.order = word, parts, dimension, order
+
+
+M = Measure
+TURNING = (M.SPIN, M.SPIN_BODY, M.SPIN_RATE, M.SPIN_BODY_RATE)
+ANGLES = (M.ANGLE, M.ANGLE_RATE)
+SUMS = (M.ANGULAR_MOMENTUM, M.INERTIA, M.MOMENTUM, M.MASS)  #: over all bodies
+REACTIONS = (M.REACTION, M.MULTIPLIER)
+#: Motion of a marker: word -> what it measures, and the part.
+QUANTITIES: dict[str, tuple[Measure, str]] = {
+    measure.word.format(part): (measure, part)
+    for measure in (M.POSITION, M.VELOCITY, M.ACCELERATION, *ANGLES, M.DISTANCE, M.DISTANCE_RATE, *TURNING, *SUMS[:2])
+    for part in measure.parts
 }
-QUANTITIES |= {"angle": (0, 3), "angle_rate": (1, 3)}  # turn about the z axis of another marker, or of ground
-QUANTITIES |= {"distance": (0, 4), "distance_rate": (1, 4)}
-# angular velocity and acceleration of the marker's body, in ground axes and in the marker's own
-QUANTITIES |= {
-    f"w{axis}{suffix}": (level, k)
-    for level, suffix in zip((7, 8, 9, 10), ("", "_body", "_dot", "_body_dot"), strict=True)
-    for k, axis in enumerate("xyz")
-}
-# sums over all bodies about the marker's origin, ground axes: angular momentum, inertia (levels above)
-QUANTITIES |= {f"angular_momentum_{axis}": (3, k) for k, axis in enumerate("xyz")}
-QUANTITIES |= {f"inertia_{entry}": (4, k) for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))}
+#: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.
+TOTALS = {measure.word.format(part): (measure, part) for measure in SUMS[2:] for part in measure.parts}
 #: Quantities between two markers.
 PAIRS = ("angle", "angle_rate", "distance", "distance_rate")
+#: Those of which the first may be left out: it is the ground then.
+ONE_OR_TWO = ("angle", "angle_rate")
 #: Quantities that can be seen from another marker, and resolved in the axes of another.
-RESOLVED = tuple(name for name, (level, axis) in QUANTITIES.items() if axis < 3 and level in (0, 1, 2, 7, 9))
+_RESOLVED = (M.POSITION, M.VELOCITY, M.ACCELERATION, M.SPIN, M.SPIN_RATE)
+RESOLVED = tuple(name for name, (measure, _) in QUANTITIES.items() if measure in _RESOLVED)
 #: Quantities of a force element: generalized force along its path, the path's length or angle and its rate, power.
-OF_ELEMENTS = ("force", "length", "rate", "power")
-#: Quantities of a joint and of an equation of a constraint: what it carries.
-REACTION, MULTIPLIER = "reaction", "multiplier"
-#: Parts of a reaction: force and moment, size of the force, size of its part across the axis of the joint.
-REACTION_PARTS = ("x", "y", "z", "mx", "my", "mz", "size", "normal")
-#: What a force element exerts on the body of a marker, ``force(track, on=wheel).x``, and its parts.
-WRENCH, WRENCH_PARTS = "force", ("x", "y", "z", "mx", "my", "mz", "size")
-#: Levels of what is linear in velocities.
-VELOCITIES = (1, 3, 5, 7, 8)
-#: Levels of what only the accelerations tell.
-ACCELERATIONS = (2, 9, 10)
-#: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.
-TOTALS: dict[str, tuple[int, int]] = {f"momentum_{axis}": (5, k) for k, axis in enumerate("xyz")} | {
-    "total_mass": (6, 0)
-}
+OF_ELEMENTS = {measure.word: measure for measure in (M.FORCE, M.LENGTH, M.RATE, M.POWER)}
+REACTION, MULTIPLIER, WRENCH = "reaction", "multiplier", "force"
 #: The word that stands for the centre of mass of all bodies where a marker is asked for, unless a body bears it.
 COM = "com"
-#: Quantities of two markers, of which the first may be left out: it is the ground then.
-ONE_OR_TWO = ("angle", "angle_rate")
 #: Words that begin a quantity.
 WORDS = frozenset((*QUANTITIES, *OF_ELEMENTS, REACTION, MULTIPLIER))
 
@@ -76,71 +97,34 @@ _CALL = re.compile(rf"({'|'.join(WORDS)})\((.+)\)(?:\.(\w+))?\Z", re.DOTALL)
 _KEYWORD = re.compile(r"(from|in|on)\s*=\s*", re.ASCII)
 
 
-def dimension_of(level: int, axis: int) -> Dimension:
-    """The dimension of a quantity."""
-    if axis == 3 and level < 2:
-        return dimensions.SPIN if level else dimensions.NONE
-    return LEVEL_DIMENSIONS[level]
-
-
-# -- of the markers of a mechanism -----------------------------------------------------------------------------
+# -- of the markers and elements of a mechanism ------------------------------------------------------------------------
 class Quantity(Record):
-    """Motion of a marker: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2, or 3 for its angle about
-    the z axis of the origin, 4 for its distance from the origin.
+    """What a symbol of an expression measures.
 
-    ``origin`` is the marker that it is seen from and ``axes`` the marker whose axes count; None stands for ground.
-
-    Levels of :data:`TURNING` are the angular velocity and acceleration of the marker's body.
-
-    Sums over all bodies: ``level`` :data:`ANGULAR_MOMENTUM` or :data:`INERTIA` (``axis`` 0 to 5: xx yy zz xy xz yz)
-    about the marker's origin, :data:`MOMENTUM` and :data:`MASS` without a marker.  The marker None stands for the
-    centre of mass of all bodies.
+    ``marker`` is the one that moves, or on whose body an element acts; None stands for the centre of mass of all
+    bodies.  ``origin`` is the marker that the motion is seen from and ``axes`` the marker whose axes count, None for
+    those of ground.
     """
 
-    marker: Marker | None
-    level: int
-    axis: int
+    measure: Measure
+    part: str = ""
+    marker: Marker | None = None
     origin: Marker | None = None
     axes: Marker | None = None
+    element: str = ""  #: the force element, the joint, or the equation of a constraint
+    place: str = ""  #: where an expression speaks of an element first
 
     @property
-    def dimension(self) -> Dimension:
-        """What it is measured in."""
-        return dimension_of(self.level, self.axis)
+    def dimension(self) -> Dimension | None:
+        """What it is measured in; None where that depends on the element."""
+        if self.measure in (Measure.EXERTED, Measure.REACTION):
+            return dimensions.ENERGY if self.part.startswith("m") else dimensions.FORCE
+        return self.measure.dimension
 
     @property
     def turns(self) -> bool:
         """Whether it is an angle or a rate of one."""
-        return self.level in TURNING or (self.level < 2 and self.axis == 3)
-
-    @property
-    def order(self) -> int | None:
-        """How many times the place is differentiated in it: 0, 1 or 2; None of the mass, which does not move."""
-        if self.level == MASS:
-            return None
-        return 2 if self.level in ACCELERATIONS else 1 if self.level in VELOCITIES else 0
-
-
-class WrenchQuantity(NamedTuple):
-    """A part of what a force element exerts on the body of a marker, along the axes of a marker (None: ground)."""
-
-    element: str
-    part: str
-    on: Marker
-    axes: Marker | None
-    path: str  #: where an expression speaks of it first
-
-
-class ReactionQuantity(NamedTuple):
-    """A part of the reaction of a joint, along the axes of a marker (None: ground), or the multiplier of an equation.
-
-    ``part`` is empty for a multiplier.
-    """
-
-    of: str
-    part: str
-    axes: Marker | None
-    path: str  #: where an expression speaks of it first
+        return self.measure in (*TURNING, *ANGLES)
 
 
 # -- as they are written -----------------------------------------------------------------------------------------------
@@ -295,18 +279,14 @@ class Named(NamedTuple):
         return Named(self.name, change(self.of), origin, axes, on, self.part)
 
     @property
-    def level(self) -> int:
-        """Of a motion: 0 position, 1 velocity, 2 acceleration, or one of the levels above; else -1."""
-        return QUANTITIES[self.name][0] if self.is_motion else -1
-
-    @property
-    def dimension(self) -> Dimension | None:
-        """What it is measured in; None where that depends on the element."""
+    def measured(self) -> tuple[Measure, str]:
+        """What it measures, and the part."""
         if self.is_motion:
-            return dimension_of(*QUANTITIES[self.name])
-        if self.part:
-            return dimensions.ENERGY if self.part.startswith("m") else dimensions.FORCE
-        return dimensions.ENERGY.times(dimensions.TIME, -1) if self.name == "power" else None
+            return QUANTITIES[self.name]
+        if self.name in OF_ELEMENTS and not self.part:
+            return OF_ELEMENTS[self.name], ""
+        of_joint = Measure.REACTION if self.name == REACTION else Measure.MULTIPLIER
+        return of_joint if self.is_reaction else Measure.EXERTED, self.part
 
 
 _WRITE = {

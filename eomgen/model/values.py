@@ -44,7 +44,7 @@ from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
 from .mechanism import Body, BodyShape, JointSpec
 from .names import ENERGIES, RATES, WHOLE, Namespace, Scope, join_surrogates, lone_surrogate, nearest
-from .quantities import Named, Quantity
+from .quantities import REACTIONS, Named, Quantity
 from .requirements import Requirements
 from .sympy_face import is_sympy, lower_sympy, name_of, named
 from .units import Unit
@@ -70,9 +70,8 @@ class Reader:
         self.identity = vec.identity(graph)
         self.bodies: dict[str, int] = {GROUND_NAME: GROUND}  # by name, the index
         self.markers: dict[str, Marker] = {}  # named ones (``rod.tip``) and the bodies' own frames (``rod``)
-        self.quantities: dict[str, Quantity] = {}  # motions of markers that expressions use
+        self.quantities: dict[str, Quantity] = {}  # of markers and elements, by the symbols that expressions use
         self.of_velocities: set[str] = set()  # paths of expressions that speak of velocities, also where these cancel
-        self.requested: dict[Named, str] = {}  # what force elements do, and where that is used first
         self.output: Callable[[str], Expr] = graph.symbol  # the expression of an output
         self.stand_in = graph.symbol("?")
         self.requirements = Requirements(faults)  # with the declared values of parameters
@@ -98,9 +97,9 @@ class Reader:
         names = [str(entry.name) for place in places for entry in self.description.sections[place]]
         if (name := quantity.owner) not in names:
             raise ExpressionError(f"no {what} {name!r}", 0, nearest(name, names, listed), code="EG-NAME-UNKNOWN")
-        for label in filter(None, (quantity.on, quantity.axes)):
-            self.moving(label)
-        self.requested.setdefault(quantity, path)
+        marker, axes = (self.moving(label) if label else None for label in (quantity.on, quantity.axes))
+        made = Quantity(*quantity.measured, marker, None, axes, quantity.of, path)
+        self.quantities.setdefault(str(quantity), made)
 
     def known(self, expression: Expr) -> float | None:
         """The value of an expression at the declared values of parameters, None if they do not tell."""
@@ -245,15 +244,14 @@ class Reader:
 
     def meaning(self, name: str) -> Meaning:
         """What a name in an expression stands for."""
-        kind, place, named = self.names.kinds.get(name, ""), self.quantities.get(name), Named.parse(name)
-        if place is not None:
-            return Meaning("marker", place.order, "angle" if place.turns else "length")
+        kind, quantity = self.names.kinds.get(name, ""), self.quantities.get(name)
         if name in (f"{energy}()" for energy in ENERGIES):
             return Meaning("energy")
-        if named is not None and named.is_reaction:
-            return Meaning("reaction" if named.part else "multiplier")
-        if named is not None:  # whether a force moves with velocities is known once its law is
-            return Meaning("element", 1 if named.name == "rate" else 0, "length")
+        if quantity is not None and quantity.measure in REACTIONS:
+            return Meaning(quantity.measure.name.lower())
+        if quantity is not None:  # whether a force moves with velocities is known once its law is
+            what = "element" if quantity.element else "marker"
+            return Meaning(what, quantity.measure.order, "angle" if quantity.turns else "length")
         if kind not in _LEVELS:
             return Meaning(kind)
         level = _LEVELS[kind]
