@@ -18,7 +18,6 @@ import numpy as np
 from ..base.limits.runs import ATOL, RTOL
 from ..base.operations import OPERATIONS
 from ..elements.frames import TURNS, Columns, Frame, Marker
-from ..elements.kinds import Field
 from ..errors import ModelError, Problem
 from ..expr.core import LEAVES, Expr, Graph, reachable
 from ..expr.records import Record
@@ -349,11 +348,6 @@ ASIDE = frozenset(
         *("presentation", "limits_told", "of_velocities"),
     )
 )
-#: What counts of a key of a joint's own, and how its kind is spelled: digests are compared over versions.
-_OF_A_KEY = (
-    *("doc", "required", "default", "level", "choices", "own", "not_zero", "dimension", "along", "exponent", "local"),
-)
-_KINDS = {"Choice": "choice", "Scalar": "expression", "GuidePoint": "shape"}
 
 
 def model_digest(mechanism: Mechanism) -> str:
@@ -405,9 +399,6 @@ def _spell(value: Any, graph: Graph, known: dict[int, str]) -> Any:
         array = np.ascontiguousarray(value)
         return ["array", array.shape, array.dtype.str, hashlib.sha256(array.tobytes()).hexdigest()]
     kind = type(value)
-    if isinstance(value, Field):
-        parts = [getattr(value, name) for name in _OF_A_KEY]
-        return ["list", _KINDS[kind.__name__], *(_spell(one, graph, known) for one in parts)]
     if kind.__module__.startswith("eomgen."):
         fields = [(name, one) for name, one in sorted(_fields(value).items()) if name not in ASIDE]
         return [kind.__qualname__, *((name, _spell(one, graph, known)) for name, one in fields)]
@@ -417,8 +408,7 @@ def _spell(value: Any, graph: Graph, known: dict[int, str]) -> Any:
 def _fields(value: Any) -> dict[str, Any]:
     """The attributes of an object; of a dataclass its fields alone, as others may have been looked up since."""
     if (declared := getattr(value, "__dataclass_fields__", None)) is not None:
-        fields = {name: getattr(value, name) for name in declared}
-        return fields | _fields(fields.pop("defaults")) if isinstance(value, Mechanism) else fields
+        return {name: getattr(value, name) for name in declared}
     slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
     result = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
     return {**result, **getattr(value, "__dict__", {})}
