@@ -51,7 +51,7 @@ class Operation(NamedTuple):
         (y, operands...) -> size of its own rounding, in units in the last place of 1.
     recurrence : callable
         (graph, y, operands...) -> numerators, one an operand, and divisor of y' = sum (numerator operand') / divisor,
-        None for 1.  Taylor series follow from it.  None where codegen/c_series.py has a formula of its own.
+        None for 1.  Taylor series follow from it.  None where codegen/series.py has a formula of its own.
     sympy : str or callable
         Name of SymPy's function, or (sympy, operands...) -> expression.
     sympy_class : str

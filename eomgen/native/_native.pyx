@@ -9,7 +9,7 @@ the table and the JSON metadata in it. In an exported package the model is linke
 Threads: contexts never change but for the work array that one call leaves to the next, and each call has its work array
 to itself, on the stack when small and on the heap otherwise. So any number of threads may call one kernel at once, in
 free-threaded Pythons too; only ``failure`` is shared: it holds the last failure of any thread. Batches and long kernels
-run without the GIL. Lanes that are compiled when needed are published by atomic operations (_lanes.pxi). Steppers and
+run without the GIL. Lanes that are compiled when needed are published by atomic operations (_model.pxi). Steppers and
 runs are of one thread each; their solutions (Dense) may be read by many.
 """
 cimport cython

@@ -63,7 +63,7 @@ def as_real(raw: Any) -> Array | None:
 
     Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy,
     in lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none, nor is what fails to
-    convert, whatever it raises.  The compiled layer has the same rule in C, eomgen/native/_numbers.pxi.
+    convert, whatever it raises.  The compiled layer has the same rule in C, eomgen/native/_arguments.pxi.
     """
     try:
         if type(raw) is np.ndarray:

@@ -81,7 +81,7 @@ int fmu_project(fmu_instance *f, const double *x, double *closed);
 /* A status of the model as one of FMI. */
 int fmu_judge(fmu_instance *f, int status, const char *what);
 
-/* Clocks of sampled states: their first times that are not past, as simulation/clocks.py finds them. */
+/* Clocks of sampled states: their first times that are not past, as runtime/runs/events.py finds them. */
 int fmu_set_clocks(fmu_instance *f);
 
 /* Model exchange. */
