@@ -240,8 +240,8 @@ def _shape(
     made, o = solid(**lengths), graph.zero
     a, b, c = map(graph.lift, made.gyration())
     sizes = _in_a_row(x for key, x in lengths.items() if key != "inner_radius")
-    own = MassProperties(made.content(), (o, o, graph.lift(made.centre())), ((a, o, o), (o, b, o), (o, o, c)))
-    return own, sizes
+    unit = MassProperties(made.content(), (o, o, graph.lift(made.centre())), ((a, o, o), (o, b, o), (o, o, c)))
+    return unit, sizes
 
 
 def _in_a_row(values: Iterable[Any]) -> tuple[Expr, ...]:
@@ -322,7 +322,7 @@ def read_display(reader: Reader, name: str, path: str, raw: Any) -> None:
 
 #: Keys of which a body has one at most.
 EXCLUSIVE = (("inertia", "principal"), ("com", "first_moment"))
-OWN = ("mass", "com", "first_moment", "inertia", "principal")
+MASS_KEYS = ("mass", "com", "first_moment", "inertia", "principal")
 POINTS = ("com", "origin")  #: words for the point an inertia is about
 
 
@@ -339,7 +339,7 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
     if "check_inertia" in values:
         check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
     parts = read_parts(reader, entry.name, path, values)
-    keys = [key for key in OWN if key in values]
+    keys = [key for key in MASS_KEYS if key in values]
     if "solids" in values and keys:
         for key in keys:
             remedy = "leave it out, or add points"
@@ -350,10 +350,10 @@ def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
         o = vec.zero(graph)
         whole = combine(graph, parts) if parts else MassProperties(graph.zero, o, (o, o, o))
         return Body(entry.name, whole.mass, whole.com, whole.inertia, check=check)
-    return _own(reader, entry.name, path, values, parts, check)
+    return _body_of_mass(reader, entry.name, path, values, parts, check)
 
 
-def _own(
+def _body_of_mass(
     reader: Reader, name: str, path: str, values: Mapping[str, Any], points: list[MassProperties], check: str
 ) -> Body:
     """A body with a mass, a centre of mass and an inertia of its own, and points."""

@@ -98,12 +98,12 @@ def build(description: Description) -> Mechanism:
     lagrangian_values = declare_lagrangian(
         reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
     )
-    given_values = declare_equations(
+    equation_values = declare_equations(
         reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
     )
 
     declared, by_clock = declare_states(
-        reader, sections["states"], given_values is not None or lagrangian_values is not None
+        reader, sections["states"], equation_values is not None or lagrangian_values is not None
     )
     element_values, state_rates = element_states(reader, sections["forces"])
     switching = declare_switches(reader, sections["constraints"])
@@ -114,7 +114,7 @@ def build(description: Description) -> Mechanism:
     reader.shapes = partial(_shapes, reader)
     forces = build_elements(reader, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
-    raw = build_equations(reader, given_values)
+    raw = build_equations(reader, equation_values)
     if lagrangian is not None:
         raw = differentiate(graph, lagrangian, clock(graph, inputs))
         require_quadratic(reader, raw)
@@ -124,9 +124,9 @@ def build(description: Description) -> Mechanism:
     outputs = read_outputs()
     switched = build_switches(reader, switching, constraints)
     constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
-    own_events = build_events(reader, sections["events"])
-    check_resets(reader, own_events, clocks, switched)
-    events = (*own_events, *samplings, *events_of_switches(reader, switching, switched))
+    declared_events = build_events(reader, sections["events"])
+    check_resets(reader, declared_events, clocks, switched)
+    events = (*declared_events, *samplings, *events_of_switches(reader, switching, switched))
     differentiated = list_differentiated(reader, lagrangian, raw, constraints, switched, events, outputs)
     inputs = add_rates(reader, inputs, differentiated)
     moves = ("coordinate", "velocity", *(("state",) if declared or element_values or switching else ()))
@@ -136,10 +136,10 @@ def build(description: Description) -> Mechanism:
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
     doc = reader.text("doc", values.get("doc", ""))
-    limits_told = _limit_notes(reader, values.get("limits"))
+    reports_limits = _limit_notes(reader, values.get("limits"))
     check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
-    if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
+    if lagrangian_values is None and equation_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian", "EG-MISSING")
     _check_mass(reader, bodies)
     negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)
@@ -182,7 +182,7 @@ def build(description: Description) -> Mechanism:
         check_inertia=check_inertia,
         negative=negative,
         requirements=tuple(reader.requirements.all),
-        defaults=RunDefaults(initial, others, guess, simulation, limits_told),
+        defaults=RunDefaults(initial, others, guess, simulation, reports_limits),
         presentation=Presentation(
             doc=doc,
             latex=dict(reader.latex),

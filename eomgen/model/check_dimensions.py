@@ -83,13 +83,15 @@ def check_dimensions(reader: Reader, joints: tuple[JointSpec, ...]) -> None:
             return acts_on_length(section, values, row, lambda name: kinds.get(name) == "length")
 
         def lost(row: Field, section: str = section, entry: Any = entry) -> bool:  # what it acts on is not known
-            own = entry.values if section in ("forces", "constraints") and entry is not None else {}
-            return any(str(own[key]) not in moved for key in (row.along, "coordinate") if own.get(key) is not None)
+            acts_on = entry.values if section in ("forces", "constraints") and entry is not None else {}
+            return any(
+                str(acts_on[key]) not in moved for key in (row.along, "coordinate") if acts_on.get(key) is not None
+            )
 
         for word, row in field.local.items() if field is not None and local else ():
             if word in local:
-                own = None if lost(row) else row.measured_in({}, (), length(row))
-                check.known[local[word].id] = Known(own)
+                dimension = None if lost(row) else row.measured_in({}, (), length(row))
+                check.known[local[word].id] = Known(dimension)
         numbers = tuple(step if isinstance(step, str) else int(step) for step in steps[1:])
         wanted = None if field is None or lost(field) else field.measured_in(values, numbers, length(field))
         if section in ("outputs", "inputs") and entry is not None and entry.path in units:

@@ -35,8 +35,8 @@ from .visit import Undotted, Visitor, in_brackets, names_of, rewritten, started,
 Fault = Callable[[str, str, str, str], None]
 
 Result = TypeVar("Result")
-#: Words of expressions that no model declares.
-WORDS = frozenset(("t", "pi", "and", "or", "not", "if", "else", *ENERGIES, *TOTALS, *QUANTITIES, *callable_names()))
+#: Names in expressions that no model declares.
+RESERVED = frozenset(("t", "pi", "and", "or", "not", "if", "else", *ENERGIES, *TOTALS, *QUANTITIES, *callable_names()))
 
 
 class Refused(Exception):
@@ -121,16 +121,16 @@ class Renaming(Visitor):
         attached: Mapping[str, Attached],
         fault: Fault | None = None,
     ) -> None:
-        self.own, self.prefix, self.values, self.attached, self.fault = component, prefix, values, attached, fault
+        self.component, self.prefix, self.values, self.attached, self.fault = component, prefix, values, attached, fault
         self.markers: dict[str, tuple[str, Mapping[str, Any]]] = {}  #: name -> body and place of markers to add
 
     def word(self, name: str) -> str:
         """A name in an expression."""
         if name in self.values:
             return in_brackets(self.values[name])
-        if self.own.has_symbol(name):
+        if self.component.has_symbol(name):
             return self.prefix + name
-        if name not in WORDS:
+        if name not in RESERVED:
             self._foreign(
                 name, "declare a parameter or an input of that name in it, and give it where you add the component"
             )
@@ -140,7 +140,7 @@ class Renaming(Visitor):
         hidden = self.field.local if self.field else ()
 
         def place(marker: str) -> str:
-            if marker == COM and COM not in self.own.bodies:
+            if marker == COM and COM not in self.component.bodies:
                 return marker
             result = self.marker(marker)
             return result if isinstance(result, str) else self._named(marker, result)
@@ -151,8 +151,8 @@ class Renaming(Visitor):
         return rewritten(value, lambda name: name if name in hidden else self.word(name), quantity)
 
     def coordinate(self, name: str) -> str:
-        known = name in self.own.elements or self.own.has_symbol(name)
-        return self.prefix + name if known or self.own.closed else name
+        known = name in self.component.elements or self.component.has_symbol(name)
+        return self.prefix + name if known or self.component.closed else name
 
     def latex(self, text: Any) -> Any:
         return with_instance(text, self.prefix.strip("_")) if isinstance(text, str) and text else text
@@ -160,7 +160,7 @@ class Renaming(Visitor):
     def body(self, name: str) -> str:
         if name in self.attached:
             return self.attached[name].body
-        return self.prefix + name if name in self.own.bodies or self.own.closed else name
+        return self.prefix + name if name in self.component.bodies or self.component.closed else name
 
     def marker(self, reference: Any) -> Any:
         body = reference.get("body") if isinstance(reference, Mapping) else reference
@@ -169,8 +169,10 @@ class Renaming(Visitor):
         body, _, name = body.partition(".")
         if body in self.attached:
             return self._on_attachment(body, name, reference)
-        if body not in self.own.bodies:
-            self._foreign(body, f"it has the bodies and attachments {', '.join([*self.own.bodies, *self.attached])}")
+        if body not in self.component.bodies:
+            self._foreign(
+                body, f"it has the bodies and attachments {', '.join([*self.component.bodies, *self.attached])}"
+            )
             return reference if isinstance(reference, str) else super().marker(reference)
         return super().marker(reference)
 
@@ -406,7 +408,7 @@ def _values(
         elif raw is not None:
             texts[name] = str(raw)
         elif not is_constant(value := entry.values.get("value")):  # in parameters of its own that stand before it
-            if (own := sound_unit(entry.values.get("unit"))) is not None and own.size != 1.0:
+            if (base := sound_unit(entry.values.get("unit"))) is not None and base.size != 1.0:
                 remedy = "give an SI unit: parameters are in SI units, so the expression is too"
                 message = f"{str(value)!r} is an expression, and its unit is not an SI unit"
                 component.report(faults, f"{entry.path}.unit", message, remedy, "EG-UNIT")

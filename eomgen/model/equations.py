@@ -66,8 +66,8 @@ def describe(name: str, section: str, raw: Mapping[str, Any]) -> Description:
         inputs |= dict.fromkeys(name for name in sorted(used) if split_rate(name)[0] in stems)
     known |= {*inputs}
     description = Description(values={"name": name, section: values})
-    own = {name: value for name, value in parameters.items() if name not in known}
-    description.declare(own, inputs, [name for name in _names_of_section(values) if name not in known])
+    declared = {name: value for name, value in parameters.items() if name not in known}
+    description.declare(declared, inputs, [name for name in _names_of_section(values) if name not in known])
     give_latex(description, section, latex)
     return changed.noted(description)
 

@@ -19,7 +19,7 @@ from ..base.texts import parse_python, quote
 from ..errors import ExpressionError, no_number
 from ..expr.core import Expr, Graph
 from .names import callable_names, nearest
-from .quantities import MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WORDS, WRENCH, Call, Named
+from .quantities import HEADS, MULTIPLIER, OF_ELEMENTS, QUANTITIES, REACTION, WRENCH, Call, Named
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -133,7 +133,7 @@ class _Walker:
     graph: Graph
     resolve: Resolve
     locate: Locate | None
-    words: Mapping[str, tuple[int, int]] = field(default_factory=callable_names)
+    callables: Mapping[str, tuple[int, int]] = field(default_factory=callable_names)
     size: int = 0
 
     def wrong(self, place: int, message: str, remedy: str | None = None, code: str = "") -> ExpressionError:
@@ -188,7 +188,7 @@ class _Walker:
     def name(self, node: ast.Name) -> Expr:
         if node.id == "pi":
             return self.graph.constant(math.pi)
-        if node.id in self.words or node.id in self.graph.functions:
+        if node.id in self.callables or node.id in self.graph.functions:
             raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
         try:
             return self.resolve(node.id)
@@ -232,15 +232,15 @@ class _Walker:
         if not isinstance(node.func, ast.Name):
             raise self.fault(node, "only the listed functions can be called")
         name = node.func.id
-        if name in WORDS and name not in self.words and (name in QUANTITIES or name not in self.graph.functions):
+        if name in HEADS and name not in self.callables and (name in QUANTITIES or name not in self.graph.functions):
             return self.quantity(node, name)
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
         declared = self.graph.functions.get(name)
-        if name not in self.words and declared is None:
-            known = [*self.words, *self.graph.functions, *((*QUANTITIES, *OF_ELEMENTS) if self.locate else ())]
+        if name not in self.callables and declared is None:
+            known = [*self.callables, *self.graph.functions, *((*QUANTITIES, *OF_ELEMENTS) if self.locate else ())]
             raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))
-        least, most = self.words[name] if declared is None else (declared.arity, declared.arity)
+        least, most = self.callables[name] if declared is None else (declared.arity, declared.arity)
         if not least <= len(node.args) <= most:
             number = f"{least}" if least == most else f"{least} or more"
             plural = "" if number == "1" else "s"

@@ -498,13 +498,13 @@ class References(NamedTuple):
         """A marker, body or name as a model file refers to it; raises UsageError for a handle of another model."""
         if isinstance(value, JointHandle):
             raise ill_placed(f"{value.name} is a joint; a body or a marker is expected")
-        return self._own(value).reference if isinstance(value, MarkerHandle) else value
+        return self._of_this_model(value).reference if isinstance(value, MarkerHandle) else value
 
     def joint(self, value: Any) -> Any:
         """A joint, coordinate or name as a model file refers to it; raises UsageError for a handle of another model."""
         if isinstance(value, MarkerHandle):
             raise ill_placed(f"{value.label} is a body or marker; a joint or a coordinate is expected")
-        return self._own(value).name if isinstance(value, JointHandle) else value
+        return self._of_this_model(value).name if isinstance(value, JointHandle) else value
 
     def markers(self, raw: Any) -> Any:
         """Markers by name, their axes as a model file writes them; what is no mapping is left as it is."""
@@ -513,7 +513,7 @@ class References(NamedTuple):
         turned = {n: _turned(x.get("axes"), x.get("matrix")) for n, x in raw.items() if isinstance(x, Mapping)}
         return {name: {**x, **turned[name]} if name in turned else x for name, x in raw.items()}
 
-    def _own(self, handle: Any) -> Any:
+    def _of_this_model(self, handle: Any) -> Any:
         if handle.model is self.model:
             return handle
         name = handle.label if isinstance(handle, MarkerHandle) else handle.name

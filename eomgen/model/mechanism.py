@@ -236,7 +236,7 @@ class RunDefaults(Record):
     initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     simulation: Simulation = Simulation()
-    limits_told: bool = True  #: whether runs that pass a limit of a joint say so
+    reports_limits: bool = True  #: whether runs that pass a limit of a joint say so
 
 
 class Presentation(Record):
@@ -345,7 +345,7 @@ class Mechanism(Record):
 ASIDE = frozenset(
     (
         *("doc", "docs", "latex", "lines", "written_paths", "place", "graph", "functions", "file", "requirements"),
-        *("presentation", "limits_told", "of_velocities"),
+        *("presentation", "reports_limits", "of_velocities"),
     )
 )
 

@@ -276,8 +276,8 @@ class Scope:
         if f"{self.names.places[output]}.expression" in self.reader.of_velocities:
             self.reader.of_velocities.add(self.path)
         used = symbols_of([result]) if self.level < OUTPUT else set()
-        late = [f"the {what} {name!r}" for name, what in names_of_acceleration(self.reader, used)]
-        for what in (*late, *(repr(energy) for energy in sorted(ENERGIES) if f"{energy}()" in used)):
+        accelerations = [f"the {what} {name!r}" for name, what in names_of_acceleration(self.reader, used)]
+        for what in (*accelerations, *(repr(energy) for energy in sorted(ENERGIES) if f"{energy}()" in used)):
             message = f"the output {output!r} depends on {what}, which cannot be used here"
             self.names.faults.add(self.path, message, f"only {_LEVEL_REMEDY[self.level]}", "EG-REFERENCE")
         return result

@@ -86,14 +86,14 @@ OF_ELEMENTS = {measure.word: measure for measure in (M.FORCE, M.LENGTH, M.RATE, 
 REACTION, MULTIPLIER, WRENCH = "reaction", "multiplier", "force"
 #: The word that stands for the centre of mass of all bodies where a marker is asked for, unless a body bears it.
 COM = "com"
-#: Words that begin a quantity.
-WORDS = frozenset((*QUANTITIES, *OF_ELEMENTS, REACTION, MULTIPLIER))
+#: Names that begin a quantity.
+HEADS = frozenset((*QUANTITIES, *OF_ELEMENTS, REACTION, MULTIPLIER))
 
 _LABEL = r"[A-Za-z]\w*(?:\.\w+)*"
 _ARGUMENT = rf"\s*(?:(?:from|in|on)\s*=\s*)?{_LABEL}\s*"
 #: A quantity of named markers and elements within a text.
-IN_TEXT = rf"\b(?:{'|'.join(sorted(WORDS, key=len, reverse=True))})\({_ARGUMENT}(?:,{_ARGUMENT})*\)(?:\.[a-z]+\b)?"
-_CALL = re.compile(rf"({'|'.join(WORDS)})\((.+)\)(?:\.(\w+))?\Z", re.DOTALL)
+IN_TEXT = rf"\b(?:{'|'.join(sorted(HEADS, key=len, reverse=True))})\({_ARGUMENT}(?:,{_ARGUMENT})*\)(?:\.[a-z]+\b)?"
+_CALL = re.compile(rf"({'|'.join(HEADS)})\((.+)\)(?:\.(\w+))?\Z", re.DOTALL)
 _KEYWORD = re.compile(r"(from|in|on)\s*=\s*", re.ASCII)
 
 
@@ -133,7 +133,7 @@ class Call(NamedTuple):
 
     name: str
     labels: Sequence[str]
-    given: Mapping[str, str]
+    keywords: Mapping[str, str]
     part: str = ""
 
 
