@@ -30,6 +30,7 @@ from ..expr.vectors import Vec3
 from .pair_laws import HOLLOWS, MEETINGS, PairLaw, class_of, pair_kind, pair_states
 from .pairs import LOSSES, PairFunction, pair_meeting, pair_sum, pair_witnesses
 from .profiles import never_reached
+from .shape_keys import SHAPE_FIELDS, ContactShapes
 from .shapes import PIECED, ContactShape, Feature, by_edges
 from .soil_beds import COUNTS, STATES, bed_rates
 from .soil_laws import LATERAL, SOIL, SoilPressure, SoilShear, states_of_soil
@@ -41,8 +42,6 @@ from .states import (
     MOST_PAIRS,
     PLANAR,
     POLYGON,
-    SHAPE_FIELDS,
-    ContactShapes,
     FeatureKind,
     ShapeParts,
     cells_of,

@@ -25,7 +25,7 @@ from .build_elements import (
     element_states,
     with_locks,
 )
-from .build_functions import build_functions
+from .build_functions import build_functions, read_table
 from .build_quantities import (
     Outputs,
     build_events,
@@ -62,13 +62,6 @@ from .quantities import OF_ELEMENTS, SUMS, Measure
 from .sympy_face import in_order, name_of
 from .values import Reader
 from .visit import undotted
-
-
-def _shapes(reader: Reader, path: str, value: Any) -> Any:
-    """The shapes of a group, read by what no other model loads."""
-    from .read_shapes import read_shapes
-
-    return read_shapes(reader, path, value)
 
 
 def build(description: Description) -> Mechanism:
@@ -111,7 +104,7 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     reader.mass_data = bodies = _bodies(reader, sections["bodies"])
     reader.specs = joints = build_joints(reader, reader.joints)
-    reader.shapes = partial(_shapes, reader)
+    reader.table = partial(read_table, reader)
     forces = build_elements(reader, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     raw = build_equations(reader, equation_values)
@@ -335,11 +328,7 @@ def _simulation(reader: Reader, raw: Any) -> Simulation:
         reader.wrong("simulation", raw, kinds.Table)
         return Simulation()
     check_keys("simulation", raw, SIMULATION, reader.faults)
-    settings: dict[str, Any] = {}
-    for key, field in SIMULATION.items():
-        if key not in raw:
-            continue
-        settings[key] = field.read(reader, f"simulation.{key}", raw[key])
+    settings = {key: x.read(reader, f"simulation.{key}", raw[key]) for key, x in SIMULATION.items() if key in raw}
     if (settings.get("method") in FIXED_STEP) != ("step" in settings):
         remedy = "give step, in s" if "step" not in settings else "remove it, or set method to RK4 or moreau"
         fault = "only methods RK4 and moreau take steps of one size, and they need their size"

@@ -78,7 +78,7 @@ class Reader:
         self.units: dict[str, Unit] = {}  # by path of the parameter, input or output
         self.latex: dict[str, str] = {}  # by name, where it is given
         self.expressions: list[tuple[str, Expr, Mapping[str, Expr]]] = []  # path, expression, names of its own
-        self.shapes: Callable[[str, Any], Any] = lambda path, value: None  # of contacts between groups
+        self.table: Callable[..., Any] = lambda *of: None  # reads a table
         self.joints: Sequence[Any] = ()  # declared, with the names of their coordinates
         self.specs: Sequence[JointSpec] = ()  # the same, whose markers are read
         #: Shapes of bodies in pictures, by ``display`` or ``solids`` and the name of the body.

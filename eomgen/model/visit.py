@@ -99,29 +99,6 @@ class Visitor:
         return [self.vector(part) for part in value] if isinstance(value, list | tuple) else self.scalar(value)
 
 
-def visit(description: Description, visitor: Visitor) -> Description:
-    """The description as a visitor changes it."""
-    made = replace(description, values=dict(description.values), notes=list(description.notes))
-    made.sections = {
-        section: [visit_entry(section, entry, visitor) for entry in entries]
-        for section, entries in description.sections.items()
-    }
-    made.bindings = [one._replace(text=visitor.scalar(one.text)) for one in description.bindings]
-    values = made.values
-    if "gravity" in values:
-        values["gravity"] = visitor.vector(values["gravity"])
-    for key in ("initial", "guess"):
-        if isinstance(values.get(key), Mapping):
-            changed = {started(n, visitor.coordinate, visitor): visitor.scalar(x) for n, x in values[key].items()}
-            values[key] = changed
-    if isinstance(values.get("independent"), list | tuple):
-        values["independent"] = [_named(name, visitor.coordinate) for name in values["independent"]]
-    for key, fields in (("lagrangian", LAGRANGIAN), ("equations", EQUATIONS)):
-        if isinstance(values.get(key), Mapping):
-            values[key] = _values(values[key], fields, visitor)
-    return made
-
-
 def started(name: Any, change: Callable[[str], str], visitor: Visitor) -> Any:
     """The name of an initial value or a guess: a place of a marker, or what else changes by ``change``."""
     if place := place_of_marker(name):
@@ -173,4 +150,24 @@ class Undotted(Visitor):
 
 def undotted(description: Description) -> Description:
     """The description with every ``leg1.hip`` written ``leg1_hip``; the same one where it has no instances."""
-    return visit(description, Undotted(description.instances)) if description.instances else description
+    if not description.instances:
+        return description
+    visitor = Undotted(description.instances)
+    made = replace(description, values=dict(description.values), notes=list(description.notes))
+    made.sections = {
+        section: [visit_entry(section, entry, visitor) for entry in entries]
+        for section, entries in description.sections.items()
+    }
+    made.bindings = [one._replace(text=visitor.scalar(one.text)) for one in description.bindings]
+    values = made.values
+    if "gravity" in values:
+        values["gravity"] = visitor.vector(values["gravity"])
+    for key in ("initial", "guess"):
+        if isinstance(values.get(key), Mapping):
+            values[key] = {started(n, visitor.coordinate, visitor): visitor.scalar(x) for n, x in values[key].items()}
+    if isinstance(values.get("independent"), list | tuple):
+        values["independent"] = [_named(name, visitor.coordinate) for name in values["independent"]]
+    for key, fields in (("lagrangian", LAGRANGIAN), ("equations", EQUATIONS)):
+        if isinstance(values.get(key), Mapping):
+            values[key] = _values(values[key], fields, visitor)
+    return made
