@@ -252,12 +252,10 @@ def _misunderstood(e: Entry, element: ElementType) -> bool:
 
 def build_elements(reader: Reader, what: str, entries: list[DescribedEntry], types: Types) -> tuple[Any, ...]:
     """Elements of all entries without faults; the faults are noted."""
-    usable = check_names(entries, what, reader.faults)
-    made = [_build(Entry(reader, str(e.name), e.path, e.values), what, types) for e in usable]
-    return tuple(element for element in made if element is not None)
-
-
-def _build(e: Entry, what: str, types: Types) -> Any:
-    result = _type_of(e, what, types)
-    element = None if result is None else result.read(e)
-    return None if e.at_fault() else element
+    made = []
+    for entry in check_names(entries, what, reader.faults):
+        e = Entry(reader, str(entry.name), entry.path, entry.values)
+        element_type = _type_of(e, what, types)
+        element = None if element_type is None else element_type.read(e)
+        made += [] if element is None or e.at_fault() else [element]
+    return tuple(made)

@@ -28,13 +28,13 @@ from .build_elements import (
 from .build_functions import build_functions, read_table
 from .build_quantities import (
     Outputs,
-    build_events,
     build_states,
     build_switches,
     check_resets,
     declare_states,
     declare_switches,
     events_of_switches,
+    read_event,
     read_input,
     read_parameter,
     with_signal,
@@ -88,16 +88,11 @@ def build(description: Description) -> Mechanism:
     build_functions(reader, sections["functions"])
     reader.joints = declare_coordinates(reader, sections["joints"])
     declare_contacts(reader, sections["constraints"])
-    lagrangian_values = declare_lagrangian(
-        reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
-    )
-    equation_values = declare_equations(
-        reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
-    )
-
-    declared, by_clock = declare_states(
-        reader, sections["states"], equation_values is not None or lagrangian_values is not None
-    )
+    has_bodies = bool(sections["bodies"] or sections["joints"])
+    lagrangian_values = declare_lagrangian(reader, values.get("lagrangian"), has_bodies)
+    equation_values = declare_equations(reader, values.get("equations"), has_bodies or lagrangian_values is not None)
+    bare = lagrangian_values is not None or equation_values is not None
+    declared, by_clock = declare_states(reader, sections["states"], bare)
     element_values, state_rates = element_states(reader, sections["forces"])
     switching = declare_switches(reader, sections["constraints"])
     read_outputs = Outputs(reader, sections["outputs"]).all
@@ -117,7 +112,7 @@ def build(description: Description) -> Mechanism:
     outputs = read_outputs()
     switched = build_switches(reader, switching, constraints)
     constraints = tuple(c for c in constraints if all(c is not s.constraint for s in switched))
-    declared_events = build_events(reader, sections["events"])
+    declared_events = tuple(read_event(reader, entry) for entry in sections["events"])
     check_resets(reader, declared_events, clocks, switched)
     events = (*declared_events, *samplings, *events_of_switches(reader, switching, switched))
     differentiated = list_differentiated(reader, lagrangian, raw, constraints, switched, events, outputs)
@@ -132,7 +127,7 @@ def build(description: Description) -> Mechanism:
     reports_limits = _limit_notes(reader, values.get("limits"))
     check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
-    if lagrangian_values is None and equation_values is None and not bodies and not faults.under("bodies"):
+    if not (bare or bodies or faults.under("bodies")):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian", "EG-MISSING")
     _check_mass(reader, bodies)
     negative, inertia_notes = check_bodies(bodies, joints, reader.requirements)

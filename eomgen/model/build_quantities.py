@@ -161,12 +161,8 @@ _REPEATED = ("coordinate", "velocity", "acceleration", "multiplier")
 # -- states, events, switches ------------------------------------------------------------------------------------------
 
 
-def build_events(reader: Reader, entries: list[DescribedEntry]) -> tuple[Event, ...]:
-    """Events in the order of their declaration; faults are noted."""
-    return tuple(_event(reader, entry) for entry in entries)
-
-
-def _event(reader: Reader, entry: DescribedEntry) -> Event:
+def read_event(reader: Reader, entry: DescribedEntry) -> Event:
+    """The event of an entry; faults are noted."""
     path, values = entry.path, entry.values
     reader.names.declare("event", entry.name, path)
     check_keys(path, values, EVENT, reader.faults)
@@ -427,7 +423,7 @@ def build_switches(
         closed = values.get("closed", "closes" not in values)
         releases = _released(reader, entry, names)
         rate = reader.expression(f"{path}.stabilisation", values.get("stabilisation", 10))
-        reader.requirements.positive(f"{path}.stabilisation", rate)
+        reader.requirements.inside(f"{path}.stabilisation", rate, POSITIVE, "must be greater than 0")
         state = (state_of(str(entry.name)), reader.flag(f"{path}.closed", closed), rate)
         result.append(Switched(made.get(str(entry.name)), *state, tuple(map(state_of, releases))))
     return tuple(result)

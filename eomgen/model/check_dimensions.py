@@ -200,11 +200,8 @@ def _place(places: _Places, path: str) -> tuple[str, DescribedEntry | None, list
     start = path
     while start and start not in places:
         start = parent_of(start)
-    return (*places.get(start, (path.partition(".")[0], None)), _steps(path[len(start) :]))
-
-
-def _steps(path: str) -> list[Any]:
-    return [int(index) if index else word for index, word in _STEP.findall(path)]
+    steps = [int(index) if index else word for index, word in _STEP.findall(path[len(start) :])]
+    return (*places.get(start, (path.partition(".")[0], None)), steps)
 
 
 def _field(section: str, entry: DescribedEntry | None, steps: list[Any]) -> tuple[Field | None, Mapping[str, Any]]:

@@ -54,16 +54,12 @@ def check_names(entries: Sequence[DescribedEntry], what: str, faults: Faults) ->
             faults.add(entry.path, *fault, "EG-NAME-FORM")
             continue
         if entry.name in seen:
-            faults.add(
-                entry.path, f"the name is given to two {_PLURAL.get(what, what + 's')}", "rename one", "EG-NAME-TAKEN"
-            )
+            message = f"the name is given to two {'bodies' if what == 'body' else f'{what}s'}"
+            faults.add(entry.path, message, "rename one", "EG-NAME-TAKEN")
         else:
             usable.append(entry)
         seen.add(entry.name)
     return usable
-
-
-_PLURAL = {"body": "bodies"}
 
 
 #: Message and remedy for a body that only pure constraints (rods and the like) connect to ground.

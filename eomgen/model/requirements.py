@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.algebra import Array
-from ..base.value_rules import LIMITS, NOT_NEGATIVE, NOT_ZERO, POINTS, POSITIVE, RANGE, RULES, Allowed
+from ..base.value_rules import LIMITS, NOT_ZERO, POINTS, RANGE, RULES, Allowed
 from ..expr.core import Expr, symbols_of
 from ..expr.evaluate import evaluate
 from .description import as_written
@@ -92,12 +92,6 @@ class Requirements:
     def inside(self, path: str, value: Expr, allowed: Allowed, remedy: str, message: str = "") -> bool:
         """Require a number in a range; ``{:g}`` in a message of its own stands for it."""
         return self.judge(path, RANGE, [value], (*allowed, remedy, message))
-
-    def positive(self, path: str, value: Expr, or_zero: bool = False) -> bool:
-        """Require a number greater than 0, or 0 too."""
-        if or_zero:
-            return self.inside(path, value, NOT_NEGATIVE, "must be 0 or greater")
-        return self.inside(path, value, POSITIVE, "must be greater than 0")
 
     def not_zero(self, path: str, value: Expr, remedy: str, message: str = "is 0") -> bool:
         """Require a number other than 0."""
