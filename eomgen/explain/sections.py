@@ -124,9 +124,9 @@ def bodies(author: Author) -> Section | None:
             (
                 f"${author.symbol(p.name)}$",
                 f"`{p.name}`",
-                _value(author.put_in.get(p.name, p.value)),
+                _value(author.substituted.get(p.name, p.value)),
                 _plain(p.unit),
-                (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
+                (_plain(p.doc) or kind) + (", value put in" if p.name in author.substituted else ""),
             )
             for p, kind in symbols
         )
@@ -475,7 +475,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
     rows = tuple(
         (f"${author.symbol(name)}$", f"{state[name]:.6g}")
         for name in names
-        if name in state and name not in author.put_in
+        if name in state and name not in author.substituted
     )
     numbers = dict(state)
     pieces: list[Piece] = [

@@ -3,7 +3,6 @@
 Reading happens in copies of the graph: nothing that is read changes what is compiled.
 """
 
-from .displayed import Displayed, ReadingView
-from .readable import Readable
+from .readable import Readable, ReadingView
 
-__all__ = ["Displayed", "Readable", "ReadingView"]
+__all__ = ["Readable", "ReadingView"]

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import IntEnum
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import sympy
 
 from ..runtime.argument_checks import unknown
 
 # -- named parts -------------------------------------------------------------------------------------------------------
-
-
-Value = TypeVar("Value")
 
 
 class NamedSum(sympy.Matrix):  # type: ignore[misc]  # SymPy has no types
@@ -42,34 +39,6 @@ class NamedSum(sympy.Matrix):  # type: ignore[misc]  # SymPy has no types
         if name not in self.parts:
             raise unknown("force element", name, self.parts)
         return self.parts[name]
-
-
-class ByName(Mapping[str, Value], Generic[Value]):
-    """Quantities by name, each made when first used; ``plain`` gives ``left_rod`` of ``left.rod``."""
-
-    def __init__(
-        self, what: str, names: Sequence[str], make: Callable[[str], Value], plain: Callable[[str], str]
-    ) -> None:
-        self._what, self._names, self._make, self._plain = what, tuple(names), make, plain
-        self._made: dict[str, Value] = {}
-
-    def __getitem__(self, name: str) -> Value:
-        if name not in self._names and isinstance(name, str):
-            name = self._plain(name)
-        if name not in self._names:
-            raise unknown(self._what, name, self._names)
-        if name not in self._made:
-            self._made[name] = self._make(name)
-        return self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return f"<by {self._what}: {', '.join(self._names)}>"
 
 
 # -- groups ------------------------------------------------------------------------------------------------------------

@@ -17,8 +17,8 @@ from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.tensors import dot, solve_symmetric
 from ..mechanics.methods.reduction import solve_velocities
-from .methods import put_in
 from .quantities import Quantities, Row, Rows
+from .symbols import substitute_values
 
 # -- states without a linearization ------------------------------------------------------------------------------------
 
@@ -144,16 +144,16 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     changes = [jvp(residual, move.along(kinematics.v)) for move in moves]
     slopes = jacobian(residual, [graph.symbol(name) for name in inputs])
     changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
-    flat = put_in([x for row in quantities.mass_matrix for x in row], at)
+    flat = substitute_values([x for row in quantities.mass_matrix for x in row], at)
     mass = [flat[k * len(free) : (k + 1) * len(free)] for k in range(len(free))]
     require_inverse(quantities, mass, named)
-    rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, put_in(quantities.force, at))
+    rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, substitute_values(quantities.force, at))
     still = dict(zip(a, rates, strict=True))
-    columns = [solve_symmetric(mass, substitute(put_in(change, at), still)) for change in changes]
+    columns = [solve_symmetric(mass, substitute(substitute_values(change, at), still)) for change in changes]
     lower = list(zip(*columns, strict=True)) if columns else []
     shifts = [_shift(quantities, move, column) for move, column in zip(moves, [*zip(*Z, strict=True)], strict=False)]
     shifts += [move.velocities for move in moves[len(shifts) :]]
-    upper = [tuple(put_in([shift[k] for shift in shifts], at)) for k in positions]
+    upper = [tuple(substitute_values([shift[k] for shift in shifts], at)) for k in positions]
     n = len(moves)
     A: Rows = (*upper, *(row[:n] for row in lower))
     B: Rows = (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower))
