@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..expr.differentiate import gradient
 from ..expr.notation import dotted
 from ..reading.document import Piece, Section, Sentence
 from ..reading.quantities import Quantities, needed
-from .author import Author, PrintedQuantity
+from .author import Author
 
 
 def energies(author: Author) -> Section | None:
@@ -22,17 +22,11 @@ def energies(author: Author) -> Section | None:
     if author.mechanism.written is not None:
         return None
     T, V = author.letter("T"), author.letter("V")
-    pieces = [
-        Sentence(
-            f"Kinetic energy ${T}$ and potential energy ${V}$ of gravity and springs (J):"
-            if author.mechanism.lagrangian is None
-            else f"${T}$ holds the terms of the Lagrangian of second degree in the velocities, ${V}$ those of degree 0 "
-            "with the other sign (J):"
-        ),
-        *author.quantity(T, "T"),
-        *author.quantity(V, "V"),
-    ]
-    return Section("Energies", tuple(pieces))
+    text = f"Kinetic energy ${T}$ and potential energy ${V}$ of gravity and springs (J):"
+    if author.mechanism.lagrangian is not None:
+        text = f"${T}$ holds the terms of the Lagrangian of second degree in the velocities, ${V}$ those of degree 0 "
+        text += "with the other sign (J):"
+    return Section("Energies", (Sentence(text), *author.quantity(T, "T"), *author.quantity(V, "V")))
 
 
 def steps(author: Author) -> Section | None:
@@ -46,39 +40,32 @@ def steps(author: Author) -> Section | None:
     return Section(title, tuple(tell(author)))
 
 
-def _embedding(author: Author) -> list[Piece]:
+def _embedding(author: Author) -> Iterator[Piece]:
     axis = author.plane
     kept = range(6) if axis is None else [*author.within, 3 + axis]
 
-    def each(letter: str, what: str, columns: bool) -> list[Piece]:
-        pieces: list[Piece] = []
+    def each(letter: str, what: str, columns: bool) -> Iterator[Piece]:
         for k, body in enumerate(author.mechanism.bodies):
             at = [6 * k + i for i in kept]
             pick = partial(_part, at, at if columns else None)
-            pieces += author.quantity(author.of(letter, body.name), what, pick=pick)
-        return pieces
+            yield from author.quantity(author.of(letter, body.name), what, pick=pick)
 
-    pieces: list[Piece] = [
-        Sentence(
-            "Of each body, $\\mathbf{v}$ holds the velocity of its centre of mass, in ground axes, and its angular "
-            f"velocity{' in its own axes' if axis is None else ''}. They are $\\mathbf{{v}} = \\mathbf{{B}} "
-            "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with the velocity transformation of the body"
-        ),
-        *each(r"\mathbf{B}", "body_velocity_transformation", False),
-        Sentence("The mass and the inertia of each body, in the same order, form its mass matrix"),
-        *each(r"\mathbf{M}", "body_mass_matrix", True),
-    ]
-    return [
-        *pieces,
-        Sentence("The mass matrix of the independent accelerations is the sum over all bodies"),
-        author.line(r"\mathbf{M}", r"\mathbf{B}_1^T \mathbf{M}_1 \mathbf{B}_1 + \ldots"),
-        Sentence(
-            "The part of the accelerations of the bodies that holds no $\\ddot{\\mathbf{q}}_i$ and their gyroscopic "
-            "moments give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all elements are "
-            "together $\\mathbf{Q}$:"
-        ),
-        *_right_side(author),
-    ]
+    yield Sentence(
+        "Of each body, $\\mathbf{v}$ holds the velocity of its centre of mass, in ground axes, and its angular "
+        f"velocity{' in its own axes' if axis is None else ''}. They are $\\mathbf{{v}} = \\mathbf{{B}} "
+        "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with the velocity transformation of the body"
+    )
+    yield from each(r"\mathbf{B}", "body_velocity_transformation", False)
+    yield Sentence("The mass and the inertia of each body, in the same order, form its mass matrix")
+    yield from each(r"\mathbf{M}", "body_mass_matrix", True)
+    yield Sentence("The mass matrix of the independent accelerations is the sum over all bodies")
+    yield author.line(r"\mathbf{M}", r"\mathbf{B}_1^T \mathbf{M}_1 \mathbf{B}_1 + \ldots")
+    yield Sentence(
+        "The part of the accelerations of the bodies that holds no $\\ddot{\\mathbf{q}}_i$ and their gyroscopic "
+        "moments give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all elements are "
+        "together $\\mathbf{Q}$:"
+    )
+    yield from _right_side(author)
 
 
 def _part(rows: list[int], columns: list[int] | None, whole: Any) -> Any:
@@ -86,41 +73,36 @@ def _part(rows: list[int], columns: list[int] | None, whole: Any) -> Any:
     return whole[rows, :] if columns is None else whole[rows, columns]
 
 
-def _right_side(author: Author) -> list[Piece]:
-    return [
-        *author.quantity(r"\mathbf{Q}_v", "quadratic_velocity"),
-        *author.quantity(r"\mathbf{Q}", "generalized_forces", pick=lambda total: sympy.Matrix(list(total))),
-        Sentence("The right side of the equations of motion is $\\mathbf{Q} + \\mathbf{Q}_v$."),
-    ]
+def _right_side(author: Author) -> Iterator[Piece]:
+    yield from author.quantity(r"\mathbf{Q}_v", "quadratic_velocity")
+    yield from author.quantity(r"\mathbf{Q}", "generalized_forces", pick=lambda total: sympy.Matrix(list(total)))
+    yield Sentence("The right side of the equations of motion is $\\mathbf{Q} + \\mathbf{Q}_v$.")
 
 
-def _lagrange(author: Author) -> list[Piece]:
+def _lagrange(author: Author) -> Iterator[Piece]:
     k = author.equations.kinematics
     T, L, V = map(author.letter, "TLV")
     bare = k.mechanism.lagrangian is not None
     T, rest = (L, "") if bare else (T, f" + \\frac{{\\partial {V}}}{{\\partial q}}")
-    pieces: list[Piece] = [
-        Sentence(
-            "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
-            f"\\frac{{\\partial {T}}}{{\\partial\\dot{{q}}}} - \\frac{{\\partial {T}}}{{\\partial q}}{rest} = "
-            "Q_q$, where $Q_q$ holds the forces without a potential"
-            + (" and those of the constraints." if author.equations.constraint_names else ".")
-        )
-    ]
+    yield Sentence(
+        "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
+        f"\\frac{{\\partial {T}}}{{\\partial\\dot{{q}}}} - \\frac{{\\partial {T}}}{{\\partial q}}{rest} = "
+        "Q_q$, where $Q_q$ holds the forces without a potential"
+        + (" and those of the constraints." if author.equations.constraint_names else ".")
+    )
     if bare:
-        pieces += author.quantity(L, "lagrangian")
+        yield from author.quantity(L, "lagrangian")
     for j, name in enumerate(k.names):
         if k.velocity_names[j : j + 1] != (f"{name}_dot",):
-            pieces.append(Sentence("Coordinates that are no angles or lengths follow from their angular velocities."))
+            yield Sentence("Coordinates that are no angles or lengths follow from their angular velocities.")
             break
         q = author.symbol(name)
         for left, choose in _derivatives(q, j, T, None if bare else V):
             named, (value,) = author.form("derivatives of energies", choose, "d_")
-            pieces += author.formulas(left, value, named)
+            yield from author.formulas(left, value, named)
     if k.velocity_names and author.equations.constraint_names:
-        pieces.append(Sentence("Multiplied by $\\mathbf{B}^T$, these equations lose the forces of the constraints:"))
-        pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
-    return pieces
+        yield Sentence("Multiplied by $\\mathbf{B}^T$, these equations lose the forces of the constraints:")
+        yield from author.quantity(r"\mathbf{B}", "velocity_transformation")
 
 
 def _derivatives(q: str, j: int, T: str, V: str | None) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
@@ -138,120 +120,87 @@ def _derivatives(q: str, j: int, T: str, V: str | None) -> list[tuple[str, Calla
     ]
 
 
-def _newton_euler(author: Author) -> list[Piece]:
-    eqs = author.equations
-    pieces: list[Piece] = [
-        Sentence(
-            "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is the sum "
-            "of all forces on it, and the rate of its angular momentum is the sum of their moments about the centre of "
-            "mass. Symbols with the name of a joint are the components of its force and its moment on the body that it "
-            "carries."
-        )
-    ]
-    for name in eqs.free_bodies:
-        named, body = eqs.written("free_bodies", name)
-        pieces.append(Sentence(f"`{name}`:"))
-        author.printed.append(PrintedQuantity("free_bodies", name, [], []))
-        pieces += _equations(author, [*body.force, *body.moment], named)
-    pieces.append(
-        Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
+def _newton_euler(author: Author) -> Iterator[Piece]:
+    yield Sentence(
+        "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is the sum of "
+        "all forces on it, and the rate of its angular momentum is the sum of their moments about the centre of mass. "
+        "Symbols with the name of a joint are the components of its force and its moment on the body that it carries."
     )
-    for name in eqs.joint_forces:
-        named, pairs = eqs.written("joint_forces", name)
-        author.printed.append(PrintedQuantity("joint_forces", name, [], []))
-        pieces += _equations(author, pairs, named)
-    return [*pieces, *_block(author)]
+    for name in author.equations.free_bodies:
+        yield Sentence(f"`{name}`:")
+        yield from author.balances("free_bodies", name, lambda body: [*body.force, *body.moment])
+    yield Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
+    for name in author.equations.joint_forces:
+        yield from author.balances("joint_forces", name)
+    yield from _block(author)
 
 
-def _equations(author: Author, pairs: list[Any], named: list[tuple[Any, Any]]) -> list[Piece]:
-    pieces: list[Piece] = []
-    for pair in pairs:
-        if pair.lhs != pair.rhs:
-            pieces += author.balance(pair.lhs, pair.rhs, named)
-    return pieces
-
-
-def _block(author: Author) -> list[Piece]:
+def _block(author: Author) -> Iterator[Piece]:
     """The linear system of a method that keeps reactions as unknowns."""
     named, system = author.equations.written("block_system")
     unknowns = ", ".join(f"${author.symbol(str(x))}$" for x in system.unknowns)
-    return [
-        Sentence(
-            f"Together they are one linear system $\\mathbf{{K}} \\mathbf{{x}} = \\mathbf{{k}}$ for the "
-            f"{len(system.unknowns)} unknowns {unknowns}:"
-        ),
-        *author.formulas(r"\mathbf{K}", system.matrix, named, ("block_system", "matrix")),
-        *author.formulas(r"\mathbf{k}", system.right, named, ("block_system", "right")),
-    ]
+    yield Sentence(
+        f"Together they are one linear system $\\mathbf{{K}} \\mathbf{{x}} = \\mathbf{{k}}$ for the "
+        f"{len(system.unknowns)} unknowns {unknowns}:"
+    )
+    yield from author.formulas(r"\mathbf{K}", system.matrix, named, ("block_system", "matrix"))
+    yield from author.formulas(r"\mathbf{k}", system.right, named, ("block_system", "right"))
 
 
-def _augmented(author: Author) -> list[Piece]:
-    return [
-        Sentence(
-            "The accelerations of the tree and the multipliers $\\boldsymbol{\\lambda}$ of the constraints are the "
-            "unknowns: $\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\boldsymbol{\\lambda} = \\mathbf{Q} + "
-            "\\mathbf{Q}_v$ and $\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\boldsymbol{\\gamma}$."
-        ),
-        *_block(author),
-    ]
+def _augmented(author: Author) -> Iterator[Piece]:
+    yield Sentence(
+        "The accelerations of the tree and the multipliers $\\boldsymbol{\\lambda}$ of the constraints are the "
+        "unknowns: $\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\boldsymbol{\\lambda} = \\mathbf{Q} + "
+        "\\mathbf{Q}_v$ and $\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\boldsymbol{\\gamma}$."
+    )
+    yield from _block(author)
 
 
-def _gibbs_appell(author: Author) -> list[Piece]:
+def _gibbs_appell(author: Author) -> Iterator[Piece]:
     S = author.letter("S")
-    return [
-        Sentence(
-            f"The Gibbs function ${S}$ is half the sum of mass times the square of acceleration over all bodies; what "
-            "is free of accelerations is left out, because only derivatives by accelerations are needed:"
-        ),
-        *author.quantity(S, "gibbs_function"),
-        Sentence(
-            "Its derivatives by the accelerations are the generalized forces: "
-            f"$\\frac{{\\partial {S}}}{{\\partial\\ddot{{q}}}} = Q_q$."
-        ),
-        *_right_side(author),
-    ]
+    yield Sentence(
+        f"The Gibbs function ${S}$ is half the sum of mass times the square of acceleration over all bodies; what is "
+        "free of accelerations is left out, because only derivatives by accelerations are needed:"
+    )
+    yield from author.quantity(S, "gibbs_function")
+    yield Sentence(
+        "Its derivatives by the accelerations are the generalized forces: "
+        f"$\\frac{{\\partial {S}}}{{\\partial\\ddot{{q}}}} = Q_q$."
+    )
+    yield from _right_side(author)
 
 
-def _hamilton(author: Author) -> list[Piece]:
-    eqs = author.equations
-    symbols = ", ".join(f"${author.symbol(str(p))}$" for p in eqs.momentum_symbols)
+def _hamilton(author: Author) -> Iterator[Piece]:
+    symbols = ", ".join(f"${author.symbol(str(p))}$" for p in author.equations.momentum_symbols)
     L, H = map(author.letter, "LH")
-    return [
-        Sentence(f"The momenta {symbols} are the derivatives of ${L}$ by the velocities:"),
-        *author.quantity(r"\mathbf{p}", "momenta"),
-        Sentence(
-            f"The Hamiltonian is ${H} = \\mathbf{{p}}^T \\dot{{\\mathbf{{q}}}} - {L}$, in coordinates and momenta:"
-        ),
-        *author.quantity(H, "hamiltonian"),
-        Sentence(
-            f"The rates of the momenta are $\\dot{{p}} = -\\frac{{\\partial {H}}}{{\\partial q}} + Q_q$; written in "
-            "velocities:"
-        ),
-        *author.quantity(r"\dot{\mathbf{p}}", "momentum_rates"),
-    ]
+    yield Sentence(f"The momenta {symbols} are the derivatives of ${L}$ by the velocities:")
+    yield from author.quantity(r"\mathbf{p}", "momenta")
+    text = f"The Hamiltonian is ${H} = \\mathbf{{p}}^T \\dot{{\\mathbf{{q}}}} - {L}$, in coordinates and momenta:"
+    yield Sentence(text)
+    yield from author.quantity(H, "hamiltonian")
+    text = f"The rates of the momenta are $\\dot{{p}} = -\\frac{{\\partial {H}}}{{\\partial q}} + Q_q$; written in "
+    yield Sentence(f"{text}velocities:")
+    yield from author.quantity(r"\dot{\mathbf{p}}", "momentum_rates")
 
 
-def _recursive(author: Author) -> list[Piece]:
+def _recursive(author: Author) -> Iterator[Piece]:
     k = author.equations.kinematics
-    pieces: list[Piece] = [
-        Sentence(
-            "From ground outwards, the velocity of each link is that of the link that carries it plus that of its "
-            "joint, $\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the "
-            "link; its wrench is $\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j "
-            "\\mathbf{v}_j$. From the last link inwards, wrenches and inertias of the links that a link carries are "
-            "added to its own."
-        )
-    ]
+    yield Sentence(
+        "From ground outwards, the velocity of each link is that of the link that carries it plus that of its joint, "
+        "$\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the link; its "
+        "wrench is $\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j \\mathbf{v}_j$. "
+        "From the last link inwards, wrenches and inertias of the links that a link carries are added to its own."
+    )
     for place, branch in enumerate(k.topology.branches):
         body, joint = k.mechanism.bodies[branch.body].name, k.mechanism.joints[branch.joint]
         below = "ground" if branch.parent < 0 else f"`{k.mechanism.bodies[branch.parent].name}`"
-        pieces.append(Sentence(f"Link {place + 1} is `{body}`, carried by {below} through joint `{joint.name}`:"))
+        yield Sentence(f"Link {place + 1} is `{body}`, carried by {below} through joint `{joint.name}`:")
         named, flat = author.form("velocities of links", partial(_twist, place), "w_")
-        pieces += author.formulas(author.of(r"\mathbf{v}", body), sympy.Matrix(6, 1, flat), named)
+        yield from author.formulas(author.of(r"\mathbf{v}", body), sympy.Matrix(6, 1, flat), named)
     if author.equations.constraint_names:
-        pieces.append(Sentence("The equations of the tree are then multiplied by $\\mathbf{B}^T$ of the constraints:"))
-        pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
-    return [*pieces, *_right_side(author)]
+        yield Sentence("The equations of the tree are then multiplied by $\\mathbf{B}^T$ of the constraints:")
+        yield from author.quantity(r"\mathbf{B}", "velocity_transformation")
+    yield from _right_side(author)
 
 
 def _twist(place: int, quantities: Quantities) -> list[Expr]:
@@ -260,7 +209,7 @@ def _twist(place: int, quantities: Quantities) -> list[Expr]:
 
 
 #: Method -> title of its section, and what tells it.
-STEPS: dict[str, tuple[str, Callable[[Author], list[Piece]]]] = {
+STEPS: dict[str, tuple[str, Callable[[Author], Iterator[Piece]]]] = {
     "embedding": ("Embedding technique", _embedding),
     "lagrange": ("Lagrange's equations", _lagrange),
     "newton_euler": ("Newton's and Euler's equations of the free bodies", _newton_euler),
@@ -275,41 +224,38 @@ STEPS: dict[str, tuple[str, Callable[[Author], list[Piece]]]] = {
 def final(author: Author) -> Section:
     """The equations of motion."""
     eqs = author.equations
-    rates = ", ".join(f"${author.symbol(name)}$" for name in eqs.acceleration_names)
-    if not eqs.acceleration_names:
+    rates = [author.symbol(name) for name in eqs.acceleration_names]
+    if not rates:
         return Section("Equations of motion", tuple(_prescribed(author)))
     try:
         named, mass, force = eqs.intermediates, eqs.mass_matrix, eqs.force
     except UnavailableError as error:
         return Section("Equations of motion", (Sentence(str(error).partition("\n")[0]),))
-    pieces: list[Piece] = [
-        Sentence(f"$\\mathbf{{M}} \\ddot{{\\mathbf{{q}}}}_i = \\mathbf{{f}}$ for the accelerations {rates}, with")
-    ]
     one = len(mass) == 1
     left, right = map(author.letter, "Mf") if one else (r"\mathbf{M}", r"\mathbf{f}")
-    if one:
-        pieces = [Sentence(f"${left} {author.symbol(eqs.acceleration_names[0])} = {right}$ with")]
-    formulas = author.formulas(left, mass[0] if one else mass, named, ("mass_matrix", None), True)
-    pieces += formulas
+    text = f"${left} {rates[0]} = {right}$ with"
+    if not one:
+        listed = ", ".join(f"${x}$" for x in rates)
+        text = f"$\\mathbf{{M}} \\ddot{{\\mathbf{{q}}}}_i = \\mathbf{{f}}$ for the accelerations {listed}, with"
+    formulas = author.formulas(left, mass, named, ("mass_matrix", None), True)
     known = set() if isinstance(formulas[0], Sentence) else {symbol for symbol, _ in needed(named, mass)}
-    pieces += author.formulas(right, force[0] if one else force, named, ("force", None), explained=known)
-    return Section("Equations of motion", tuple(pieces))
+    formulas += author.formulas(right, force, named, ("force", None), explained=known)
+    return Section("Equations of motion", (Sentence(text), *formulas))
 
 
-def _prescribed(author: Author) -> list[Piece]:
+def _prescribed(author: Author) -> Iterator[Piece]:
     """What is left where no degree of freedom is: the forces of the constraints, those of drivers among them."""
     opening = "The motion is prescribed: no acceleration is unknown."
     named, system = author.equations.written("tree_system")
     if not any(x != 0 for x in (*system.mass_matrix, *system.force)):
-        return [Sentence(f"{opening} Nothing has mass and no forces act, so that the constraints exert none.")]
-    pieces: list[Piece] = [
-        Sentence(
-            f"{opening} The constraints exert the forces $-\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
-            "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\boldsymbol{\\lambda}$, one component belongs to each constraint "
-            "equation; that of a driver, with the opposite sign, is the force or torque with which it drives its "
-            "coordinate."
-        )
-    ]
-    pieces += author.formulas(r"\mathbf{M}", system.mass_matrix, named, ("tree_system", None), True)
+        yield Sentence(f"{opening} Nothing has mass and no forces act, so that the constraints exert none.")
+        return
+    yield Sentence(
+        f"{opening} The constraints exert the forces $-\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
+        "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\boldsymbol{\\lambda}$, one component belongs to each constraint "
+        "equation; that of a driver, with the opposite sign, is the force or torque with which it drives its "
+        "coordinate."
+    )
+    yield from author.formulas(r"\mathbf{M}", system.mass_matrix, named, ("tree_system", None), True)
     known = {symbol for symbol, _ in needed(named, system.mass_matrix)}
-    return pieces + author.formulas(r"\mathbf{f}", system.force, named, ("tree_system", None), explained=known)
+    yield from author.formulas(r"\mathbf{f}", system.force, named, ("tree_system", None), explained=known)

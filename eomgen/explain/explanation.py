@@ -14,7 +14,7 @@ from ..base.files import write_whole
 from ..contact.pairs import opaque_names
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..expr.notation import Notation
-from ..reading.document import DrawnPicture, Folded, Piece, Section, write_html, write_markdown, write_tex
+from ..reading.document import DrawnPicture, Section, write_html, write_markdown, write_tex
 
 if TYPE_CHECKING:
     from .author import Author
@@ -93,7 +93,8 @@ class Explanation:
         return path
 
     def _save_tex(self, path: Path) -> None:
-        picture = next(_pictures(self.sections), None)
+        pieces = (piece for section in self.sections for piece in section.pieces)
+        picture = next((piece for piece in pieces if isinstance(piece, DrawnPicture)), None)
         name = f"{path.stem}.png"
         text = write_tex(self.title, self.sections, self._names, None if picture is None else name)
         if picture is not None:
@@ -123,16 +124,6 @@ class Explanation:
     def __repr__(self) -> str:
         verdict = "not compared" if self.difference is None else f"difference {self.difference:.1e}"
         return f"<{self.title}: {len(self.sections)} sections, {verdict}>"
-
-
-def _pictures(sections: Sequence[Section]) -> Any:
-    """All pictures of a document."""
-    pending: list[Piece] = [piece for section in sections for piece in section.pieces]
-    for piece in pending:
-        if isinstance(piece, Folded):
-            pending += piece.pieces
-        if isinstance(piece, DrawnPicture):
-            yield piece
 
 
 def explain(equations: Any, level: str = "full") -> Explanation:

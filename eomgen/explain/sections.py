@@ -246,14 +246,14 @@ def constraints(author: Author) -> Section:
     """Constraint equations, their derivatives, degrees of freedom, and where the partition fails."""
     eqs = author.equations
     rows, n = eqs.constraint_names, len(eqs.kinematics.velocity_names)
-    free = eqs.mobility.n_dof
+    freedoms = f"{_count(eqs.mobility.n_dof, 'degree')} of freedom"
     if not rows:
         text = f"There are no constraint equations: all {n} velocities are independent, and the system has "
-        return Section("Constraints and degrees of freedom", (Sentence(f"{text}{_freedoms(free)}."),))
+        return Section("Constraints and degrees of freedom", (Sentence(f"{text}{freedoms}."),))
     pieces: list[Piece] = [
         Sentence(
             f"{len(rows)} independent equation{' constrains' if len(rows) == 1 else 's constrain'} the {n} velocities "
-            f"of the tree, which leaves {n} - {len(rows)} = {_freedoms(free)}. "
+            f"of the tree, which leaves {n} - {len(rows)} = {freedoms}. "
             f"{'It is' if len(rows) == 1 else 'They are'} {', '.join(f'`{row}`' for row in rows)}."
         )
     ]
@@ -272,7 +272,7 @@ def constraints(author: Author) -> Section:
     pieces.append(Sentence(_second_derivative(eqs.kinematics.constraints.stabilised)))
     pieces += author.quantity(r"\boldsymbol{\gamma}", "gamma")
     pieces += _dead_centres(author)
-    if free:
+    if eqs.mobility.n_dof:
         pieces.append(
             Sentence(
                 "All velocities follow from the independent ones: $\\dot{\\mathbf{q}} = \\mathbf{B} "
@@ -296,10 +296,6 @@ def _second_derivative(stabilised: tuple[float, float] | None) -> str:
         f"Stabilised after Baumgarte, with $\\alpha = {alpha}$ and $\\beta = {beta}$ per second: "
         f"$\\ddot{{\\mathbf{{C}}}} + {terms} = {solved}"
     )
-
-
-def _freedoms(number: int) -> str:
-    return f"{number} degree{'' if number == 1 else 's'} of freedom"
 
 
 def _dead_centres(author: Author) -> list[Piece]:

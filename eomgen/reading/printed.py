@@ -47,15 +47,6 @@ from .tree_system import MANY
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
 
 
-class PrintedCoordinate(NamedTuple):
-    """A row of the table of coordinates."""
-
-    name: str
-    joint: str
-    unit: str
-    role: str
-
-
 class Letters(NamedTuple):
     """LaTeX of the letters of M v' = f."""
 
@@ -323,18 +314,13 @@ class PrintedEquations:
         return width(Matrix(tuple(map(tuple, rows))), self.names)
 
     @property
-    def coordinates(self) -> list[PrintedCoordinate]:
-        """Coordinates of the spanning tree."""
+    def coordinates(self) -> list[tuple[str, str, str, str]]:
+        """Coordinates of the spanning tree: name, joint, unit, and whether it is dependent."""
         k = self.equations.kinematics
         joints = {name: joint.name for joint in k.mechanism.joints for name in joint.coordinates}
         units = {} if k.mechanism.bare else dict(zip(k.names, (UNITS[kind] for kind in k.kinds), strict=True))
         independent = {*self.equations.independent}
-        return [
-            PrintedCoordinate(
-                name, joints.get(name, ""), units.get(name, ""), "" if name in independent else "dependent"
-            )
-            for name in k.names
-        ]
+        return [(n, joints.get(n, ""), units.get(n, ""), "" if n in independent else "dependent") for n in k.names]
 
     @property
     def title(self) -> str:

@@ -669,7 +669,7 @@ class Readable(ABC):
 
         return sympy.Symbol  # type: ignore[no-any-return]
 
-    #: Values that are put in for names, one mapping after the other.
+    #: Values that stand for names, one mapping after the other.
     _substituted: tuple[Mapping[str, Any], ...] = ()
 
     @cached_property

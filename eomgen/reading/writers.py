@@ -71,7 +71,7 @@ def _values(printed: PrintedEquations, columns: int) -> list[str]:
 
 
 def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
-    rows = [(printed.names.text(c.name), c.name, c.joint, c.unit, c.role) for c in printed.coordinates]
+    rows = [(printed.names.text(name), name, *others) for name, *others in printed.coordinates]
     if not rows:
         return
     sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -307,8 +307,8 @@ def _facts(printed: PrintedEquations) -> Iterator[Piece]:
         whole = Sentence(("with ", *listed(values)))
         yield whole if len(values) <= FOLDED else Folded(f"with {len(values)} values", (whole,))
     if coordinates := printed.coordinates:
-        roles = any(c.role for c in coordinates)
-        rows = ((f"${printed.names.latex(c.name)}$", f"`{c.name}`", c.joint, c.unit, c.role) for c in coordinates)
+        roles = any(role for *_, role in coordinates)
+        rows = ((f"${printed.names.latex(name)}$", f"`{name}`", *others) for name, *others in coordinates)
         heads = ("coordinate", "name", "joint", "unit", "")
         table = Table(heads[: 4 + roles], tuple(one[: 4 + roles] for one in rows))
         yield table if len(coordinates) <= FOLDED else Folded(f"{len(coordinates)} coordinates", (table,))
