@@ -167,17 +167,6 @@ class PrintedEquations:
         """v' of M v' = f."""
         return [self.formula(x) for x in self.equations.symbols_substituted(self.equations.acceleration_names)]
 
-    @cached_property
-    def states(self) -> list[tuple[Formula, Formula]]:
-        """First-order states: their rates, and what these are, after named parts of the latter; no sampled ones."""
-        names, sampled = self.equations.kinematics.state_names, self.equations.kinematics.mechanism.sampled_names
-        return self._pairs("state_rates", [None if n in sampled else acceleration_name(n) for n in names])
-
-    @cached_property
-    def sampled(self) -> list[tuple[Formula, Formula]]:
-        """Sampled states and what they become, behind the time of the next sample, after named parts of these."""
-        return self._pairs("sampled_values", [name for name, _ in self.equations.kinematics.sampled])
-
     def _pairs(self, quantity: str, names: Sequence[str | None]) -> list[tuple[Formula, Formula]]:
         """Named parts of a column, then its entries that have names, each with what it is."""
         if not (kept := [name for name in names if name is not None]):
@@ -187,11 +176,14 @@ class PrintedEquations:
         pairs = (*named, *zip(self.equations.symbols_substituted(kept), entries, strict=True))
         return [(self.formula(left), self.formula(right)) for left, right in pairs]
 
-    @property
+    @cached_property
     def titled_states(self) -> list[tuple[str, list[tuple[Formula, Formula]]]]:
-        """First-order states, then sampled ones, under their titles, where there are any."""
-        titled = (("first-order states", self.states), (SAMPLED, self.sampled))
-        return [(title, pairs) for title, pairs in titled if pairs]
+        """Rates of first-order states, then what sampled ones become, each after its named parts, under titles."""
+        k = self.equations.kinematics
+        rates = [None if n in k.mechanism.sampled_names else acceleration_name(n) for n in k.state_names]
+        titled = {"first-order states": self._pairs("state_rates", rates)}
+        titled[SAMPLED] = self._pairs("sampled_values", [name for name, _ in k.sampled])
+        return [(title, pairs) for title, pairs in titled.items() if pairs]
 
     @property
     def values(self) -> list[Formula]:

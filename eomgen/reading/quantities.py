@@ -33,7 +33,6 @@ from .symbols import momentum_names, multiplier_names, twist_rate_names, wrench_
 
 
 GRAVITY = "gravity"  #: name of the entry of gravity
-POTENTIAL, FORCES, DISSIPATION = "potential", "forces", "dissipation"  #: entries of a bare Lagrangian
 
 
 def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
@@ -66,9 +65,9 @@ def _of_lagrangian(kinematics: Kinematics) -> dict[str, list[Expr]]:
     assert equations is not None
     drag = gradient(bare.dissipation, list(kinematics.v))
     result = {
-        POTENTIAL: _downhill(kinematics, equations.potential_energy),
-        FORCES: list(bare.forces),
-        DISSIPATION: [-d for d in drag],
+        "potential": _downhill(kinematics, equations.potential_energy),
+        "forces": list(bare.forces),
+        "dissipation": [-d for d in drag],
     }
     return {name: force for name, force in result.items() if not all(x.is_zero for x in force)}
 

@@ -111,16 +111,22 @@ def scalar(doc: str, offered: str = "", prefix: str = "") -> Quantity[Any]:
 
 def matrix(columns: Callable[[Readable], int], doc: str, offered: str = "", form: str = "") -> Quantity[Any]:
     """A row of a SymPy matrix."""
-    return Quantity(lambda eqs, name: eqs._matrix(name, attrgetter(form or name), columns(eqs)), doc, offered)
-
-
-def column(doc: str, offered: str = "", form: str = "") -> Quantity[Any]:
-    """A row of a SymPy column."""
 
     def make(equations: Readable, name: str) -> Any:
-        return equations._matrix(name, lambda s: [(x,) for x in attrgetter(form or name)(s)], 1)
+        rows: list[Sequence[Expr]] = []
+
+        def flat(quantities: Quantities) -> list[Expr]:
+            rows[:] = ((x,) if isinstance(x, Expr) else x for x in attrgetter(form or name)(quantities))
+            return [x for row in rows for x in row]
+
+        written = equations._write(name, flat)
+        return shaped(written, (len(rows), columns(equations)))[0]
 
     return Quantity(make, doc, offered)
+
+
+#: A row of a SymPy column.
+column = partial(matrix, lambda _: 1)
 
 
 def each(
@@ -681,18 +687,6 @@ class Readable(ABC):
     def _forms(self) -> dict[str, Callable[[], tuple[list[Expr], Names]]]:
         """What gives each of these as the derivation formed it, with what names in it stand for."""
         return {}
-
-    def _matrix(self, name: str, choose: Callable[[Quantities], Sequence[Sequence[Expr]]], columns: int) -> Any:
-        import sympy
-
-        rows: list[Sequence[Expr]] = []
-
-        def flat(quantities: Quantities) -> list[Expr]:
-            rows[:] = choose(quantities)
-            return [x for row in rows for x in row]
-
-        written = self._write(name, flat)
-        return sympy.Matrix(len(rows), columns, written)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the functions that give quantities as they were formed."""
