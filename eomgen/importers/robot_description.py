@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -53,17 +53,6 @@ class RobotBody:
         return sum_inertias([link.inertia.seen(frame) for link, frame in self.members])
 
 
-class Load(NamedTuple):
-    """What a joint moves: its mass (kg), and how far from the joint its farthest centre of mass lies (m)."""
-
-    mass: float
-    reach: float
-
-    def size(self, joint_type: str) -> float:
-        """Mass along a slide (kg), mass times reach about an axis (kg m); 1 where there is none."""
-        return (self.mass if joint_type == "prismatic" else self.mass * self.reach) or 1.0
-
-
 @dataclass
 class Bodies:
     """The bodies of a robot in order from the root (ground first), and where each link is."""
@@ -81,20 +70,18 @@ class Bodies:
         """The body that carries a joint."""
         return self.home[joint.parent][0] if joint.parent else GROUND
 
-    def loads(self) -> dict[str, Load]:
-        """What the joint of each body moves, all that it carries included."""
-        result: dict[str, Load] = {}
+    def loads(self) -> dict[str, tuple[float, float]]:
+        """The mass (kg) on the joint of each body, and how far from it its farthest centre of mass lies (m)."""
+        result = dict.fromkeys(self.bodies, (0.0, 0.0))
         for body in reversed(self.bodies.values()):  # children come after their parents
-            inertia, before = body.inertia(), result.get(body.name, Load(0.0, 0.0))
-            arm = float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
-            mine = result[body.name] = Load(before.mass + inertia.mass, max(before.reach, arm))
-            if body.joint is None or not body.joint.parent:
-                continue
-            home, frame = self.home[body.joint.parent]
-            place = frame @ body.joint.outer
-            other = result.get(home, Load(0.0, 0.0))
-            reach = mine.reach + float(np.linalg.norm(place.position))
-            result[home] = Load(other.mass + mine.mass, max(other.reach, reach))
+            inertia, (mass, reach) = body.inertia(), result[body.name]
+            mass, arm = mass + inertia.mass, float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
+            reach = max(reach, arm)
+            result[body.name] = mass, reach
+            if body.joint is not None and body.joint.parent:
+                home, frame = self.home[body.joint.parent]
+                distance = float(np.linalg.norm((frame @ body.joint.outer).position))
+                result[home] = result[home][0] + mass, max(result[home][1], reach + distance)
         return result
 
     def tied(self, robot: Robot) -> set[str]:
@@ -546,7 +533,8 @@ class _Writer:
         span = span if math.isfinite(span) else 1.0
         effort, speed = limits.get("effort", 0.0), limits.get("velocity", 0.0)
         if not 0.0 < effort < math.inf:
-            effort = GRAVITY * self.loads[body.name].size(joint.type)
+            mass, reach = self.loads[body.name]
+            effort = GRAVITY * ((mass if joint.type == "prismatic" else mass * reach) or 1.0)
         law = {
             "stiffness": effort / (GIVE * span) ** 1.5,
             "restitution": REBOUND,
