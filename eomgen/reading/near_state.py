@@ -17,7 +17,7 @@ from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.tensors import dot, solve_symmetric
 from ..mechanics.methods.reduction import solve_velocities
-from .quantities import Quantities, Row, Rows
+from .quantities import Formed, Quantities, Row, Rows
 from .symbols import substitute_values
 
 # -- states without a linearization ------------------------------------------------------------------------------------
@@ -106,7 +106,7 @@ class SymbolicLinearization(NamedTuple):
     Attributes
     ----------
     A, B : sympy.Matrix
-        (n, n), (n, n_u); rows of expressions before they are written.
+        (n, n), (n, n_u).
     states, inputs : tuple of str
         What the entries of x and u are called, as in ``Module.linearize``.
     intermediates : list of (sympy.Symbol, sympy.Expr)
@@ -120,8 +120,8 @@ class SymbolicLinearization(NamedTuple):
     intermediates: Sequence[tuple[Any, Any]] = ()
 
 
-def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> SymbolicLinearization:
-    """A and B at a state; velocities that ``at`` does not name are 0.
+def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> Formed:
+    """The entries of A, then of B, at a state, and names of the states; velocities that ``at`` does not name are 0.
 
     ``equilibrium`` tells that the accelerations vanish there.
     """
@@ -158,12 +158,8 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     A: Rows = (*upper, *(row[:n] for row in lower))
     B: Rows = (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower))
     require_finite(quantities, {"A": A, "B": B}, named)
-    return SymbolicLinearization(
-        A,
-        B,
-        (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free)),
-        inputs,
-    )
+    states = (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free))
+    return Formed([x for matrix in (A, B) for row in matrix for x in row], extra=states)
 
 
 FACTORED = 120  #: operations of an entry up to which it is factored

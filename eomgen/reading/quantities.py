@@ -145,6 +145,14 @@ READABLE = 400  #: operations an expression, on average, up to which expressions
 LONGEST = 5_000  #: operations of all of them together
 
 
+class Formed(NamedTuple):
+    """Expressions of a quantity, None or names that stand in them with values, in order, and what else is known."""
+
+    flat: Sequence[Expr]
+    named: Sequence[tuple[str, Expr]] | None = None
+    extra: Any = None
+
+
 class Written(NamedTuple):
     """SymPy expressions, with the named parts that they use, each after those that it uses."""
 

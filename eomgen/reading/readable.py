@@ -21,6 +21,7 @@ from ..runtime.argument_checks import UnknownNameError, find_lacking, unknown
 from .free_bodies import BodiesApart
 from .quantities import (
     BlockSystem,
+    Formed,
     Quantities,
     SpatialMotion,
     Written,
@@ -34,7 +35,7 @@ from .symbols import model_notation, momentum_names, read_value, read_values, su
 if TYPE_CHECKING:
     from .named_parts import NamedSum
     from .near_state import SymbolicLinearization
-    from .tree_system import TreeParts, TreeSystem
+    from .tree_system import TreeSystem
 
 # -- functions of time -------------------------------------------------------------------------------------------------
 
@@ -75,9 +76,6 @@ def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
 
 Made = TypeVar("Made")  #: what a quantity is
 Derived = tuple[Kinematics, Mobility, TreeEquations]
-Names = list[tuple[str, Expr]]
-Choose = Callable[[Quantities], Sequence[Expr]]
-ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
 #: What equations must have for a display to name a quantity among those to read next.
 ANY, BODIES, PARTS, LOOPS = "any", "bodies", "parts", "loops"
 SHOWN = 8  #: names that a message lists
@@ -106,21 +104,19 @@ class Quantity(cached_property[Made]):
 
 def scalar(doc: str, offered: str = "", prefix: str = "") -> Quantity[Any]:
     """A row of one expression; its parts begin with ``prefix``."""
-    return Quantity(lambda eqs, name: eqs._write(name, lambda s: [getattr(s, name)], prefix)[0], doc, offered)
+    return Quantity(lambda eqs, n: eqs._write(n, lambda s: Formed([getattr(s, n)]), prefix)[0][0], doc, offered)
 
 
 def matrix(columns: Callable[[Readable], int], doc: str, offered: str = "", form: str = "") -> Quantity[Any]:
     """A row of a SymPy matrix."""
 
     def make(equations: Readable, name: str) -> Any:
-        rows: list[Sequence[Expr]] = []
+        def choose(quantities: Quantities) -> Formed:
+            rows = [(x,) if isinstance(x, Expr) else x for x in attrgetter(form or name)(quantities)]
+            return Formed([x for row in rows for x in row], extra=len(rows))
 
-        def flat(quantities: Quantities) -> list[Expr]:
-            rows[:] = ((x,) if isinstance(x, Expr) else x for x in attrgetter(form or name)(quantities))
-            return [x for row in rows for x in row]
-
-        written = equations._write(name, flat)
-        return shaped(written, (len(rows), columns(equations)))[0]
+        flat, rows = equations._write(name, choose)
+        return shaped(flat, (rows, columns(equations)))[0]
 
     return Quantity(make, doc, offered)
 
@@ -141,7 +137,8 @@ def each(
 
     def make(equations: Readable, name: str) -> ByName[Made]:
         def one(part: str) -> Made:
-            return build(equations._write(f"{name}.{part}", lambda s: [x for xs in form(s, part) for x in xs]))
+            flat, _ = equations._write(f"{name}.{part}", lambda s: Formed([x for xs in form(s, part) for x in xs]))
+            return build(flat)
 
         return ByName(what, names(equations), one, equations._plain)
 
@@ -313,7 +310,7 @@ class Readable(ABC):
     @cached_property
     def _motion(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
         n = self.mobility.n_dof
-        flat = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
+        flat, _ = self._write("mass_matrix", lambda s: Formed(*s.motion), "z")
         self._written["force"] = self._written["mass_matrix"]  # they are written together
         self._forms["force"] = self._forms["mass_matrix"]
         mass, force = shaped(flat, (n, n), (n, 1))
@@ -344,13 +341,10 @@ class Readable(ABC):
         """
         from .named_parts import NamedSum
 
-        names: list[str] = []
+        def choose(s: Quantities) -> Formed:
+            return Formed([*s.total_force, *(x for force in s.forces.values() for x in force)], extra=[*s.forces])
 
-        def choose(s: Quantities) -> list[Expr]:
-            names[:] = s.forces
-            return [*s.total_force, *(x for force in s.forces.values() for x in force)]
-
-        flat, n = self._write("generalized_forces", choose, "Q_"), self.mobility.n_dof
+        (flat, names), n = self._write("generalized_forces", choose, "Q_"), self.mobility.n_dof
         total, *parts = shaped(flat, *[(n, 1)] * (1 + len(names)))
         return NamedSum.of(total, dict(zip(names, parts, strict=True)), self._plain)
 
@@ -435,15 +429,9 @@ class Readable(ABC):
         from .tree_system import TreeSystem, tree_parts
 
         n_v, n_c = len(self.kinematics.v), len(self.constraint_names)
-        formed: list[TreeParts] = []
-
-        def choose(quantities: Quantities) -> list[Expr]:
-            formed[:] = [tree_parts(quantities, self.has_long_loops)]
-            return formed[0].flat
-
-        flat = self._write("tree_system", choose, "z", lambda _: formed[0].named)
+        flat, zeros = self._write("tree_system", lambda s: tree_parts(s, self.has_long_loops), "z")
         mass, force, C, gamma = shaped(flat, (n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
-        return TreeSystem(mass, force, C, gamma, formed[0].zeros)
+        return TreeSystem(mass, force, C, gamma, zeros)
 
     # -- of single methods; others refuse them and say which have them ----------------------------------------------
     body_velocity_transformation = matrix(
@@ -476,14 +464,13 @@ class Readable(ABC):
         the rates of its twist in the axes of its joint (``rod_alpha_x``, ``rod_a_x``; gravity subtracted) and the
         wrench of its joint (``A_M_x``, ``A_F_x``), then multipliers.
         """
-        names: list[str] = []
 
-        def choose(quantities: Quantities) -> list[Expr]:
-            result = quantities.block_system
-            names[:] = result.unknowns
-            return [*(x for row in result.matrix for x in row), *result.right]
+        def choose(quantities: Quantities) -> Formed:
+            matrix, names, right = quantities.block_system
+            return Formed([*(x for row in matrix for x in row), *right], extra=names)
 
-        flat, n = self._write("block_system", choose, "K_"), len(names)
+        flat, names = self._write("block_system", choose, "K_")
+        n = len(names)
         matrix, right, unknowns = shaped([*flat, *self._symbols(names)], (n, n), (n, 1), (n, 1))
         return BlockSystem(matrix, unknowns, right)
 
@@ -553,20 +540,12 @@ class Readable(ABC):
         from .near_state import SymbolicLinearization, here, linearize, over_one_denominator
 
         values = self._read(at or {})
-        states: list[tuple[str, ...]] = []
-
-        def choose(quantities: Quantities) -> Sequence[Expr]:
-            result = linearize(quantities, values, equilibrium)
-            states.append(result.states)
-            return [x for matrix in (result.A, result.B) for row in matrix for x in row]
-
-        written = self._write("linearize", choose, "A_")
+        written, names = self._write("linearize", lambda s: linearize(s, values, equilibrium), "A_")
         named = self._written.pop("linearize").intermediates
         self._require_finite("linearize", [*written, *(x for _, x in named)], here(values))
         if not named:
             written = [over_one_denominator(x) for x in written]
-        (names,), inputs = states, self.kinematics.input_names
-        n = len(names)
+        n, inputs = len(names), self.kinematics.input_names
         A, B = shaped(written, (n, n), (n, len(inputs)))
         return SymbolicLinearization(A, B, names, inputs, named)
 
@@ -684,27 +663,27 @@ class Readable(ABC):
         return {}
 
     @cached_property
-    def _forms(self) -> dict[str, Callable[[], tuple[list[Expr], Names]]]:
-        """What gives each of these as the derivation formed it, with what names in it stand for."""
+    def _forms(self) -> dict[str, Callable[[], Formed]]:
+        """What gives each of these as the derivation formed it."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the functions that give quantities as they were formed."""
         return {name: value for name, value in vars(self).items() if name != "_forms"}
 
-    def _write(self, name: str, choose: Choose, prefix: str = "", choose_names: ChooseNames | None = None) -> list[Any]:
-        """Expressions of the quantities in SymPy; their named parts are kept under the name.
+    def _write(self, name: str, choose: Callable[[Quantities], Formed], prefix: str = "") -> tuple[list[Any], Any]:
+        """Expressions of the quantities in SymPy, and what else is known; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
-        formed, names = self._form(choose, choose_names)
+        flat, named, extra = self._form(choose)
         prefix = prefix or f"{name.replace('.', '_')}_"
-        written = self.in_sympy(formed, prefix, names, of_motion=choose_names is not None)
+        written = self.in_sympy(flat, prefix, named or (), of_motion=named is not None)
         if self._substituted:
             values = [*written.expressions, *(x for _, x in written.intermediates)]
             self._require_finite(name, values, f"with {self._view}")
-        self._written[name], self._forms[name] = written, partial(self._form, choose, choose_names)
-        return written.expressions
+        self._written[name], self._forms[name] = written, partial(self._form, choose)
+        return written.expressions, extra
 
     def in_sympy(
         self,
@@ -730,19 +709,18 @@ class Readable(ABC):
         named, result = form.sympy(self._symbol, k.parameter_names, prefix, of_motion)
         return Written([(name, with_derivatives(x)) for name, x in named], list(map(with_derivatives, result)))
 
-    def _form(self, choose: Choose, choose_names: ChooseNames | None) -> tuple[list[Expr], Names]:
-        """Expressions of the quantities with values put in, and what names in them stand for."""
-        quantities = Quantities(*self.fresh())
-        expressions = list(choose(quantities))
-        names = list(choose_names(quantities)) if choose_names is not None else []
-        expressions += [x for _, x in names]
+    def _form(self, choose: Callable[[Quantities], Formed]) -> Formed:
+        """Quantities with the values that were substituted."""
+        flat, named, extra = choose(Quantities(*self.fresh()))
+        names, parts = zip(*named, strict=True) if named else ((), ())
+        whole = [*flat, *parts]
         for values in self._substituted:
-            expressions = substitute_values(expressions, values)
-        count = len(expressions) - len(names)
-        return expressions[:count], [(name, x) for (name, _), x in zip(names, expressions[count:], strict=True)]
+            whole = substitute_values(whole, values)
+        named = named and list(zip(names, whole[len(flat) :], strict=True))
+        return Formed(whole[: len(flat)], named, extra)
 
-    def as_formed(self, name: str, part: str | None = None) -> tuple[Written, list[Expr], Names]:
-        """A quantity as it was written and, to compare with, as it was formed, with what names in that stand for.
+    def as_formed(self, name: str, part: str | None = None) -> tuple[Written, Formed]:
+        """A quantity as it was written and, to compare with, as it was formed.
 
         Parts that were written together, such as those of generalized forces, are in the whole.
         """
@@ -752,7 +730,7 @@ class Readable(ABC):
         if key not in self._forms and name not in self._forms:  # made before this went through pickle
             return self.again().as_formed(name, part)
         key = key if key in self._forms else name
-        return self._written[key], *self._forms[key]()
+        return self._written[key], self._forms[key]()
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
