@@ -128,7 +128,6 @@ class Explanation:
 
 def explain(equations: Any, level: str = "full") -> Explanation:
     """See :meth:`eomgen.api.equations.Equations.explain`."""
-    from . import about_methods
     from . import sections as about
     from .author import Author
     from .comparison import compare, moving_state, state_numbers
@@ -142,8 +141,8 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     details: list[Section | None] = []
     if full:
         details += [*about.motion(author), about.constraints(author), *about.forces(author)]
-        details += [about_methods.energies(author), about_methods.steps(author)]
-    final = about_methods.final(author)
+        details += [about.energies(author), about.steps(author)]
+    final = about.final(author)
     numbers: list[Section | None] = [about.states(author), about.counts(author)]
     if full:
         state, moved = {}, False
