@@ -32,19 +32,19 @@ MEASURED = {"angle": "angle (rad)", "length": "displacement (m)", "parameter": "
 MANY = 2  #: bodies beyond which their masses are folded, and parameters beyond which their values are
 
 
-Given = ParamSpec("Given")
+P = ParamSpec("P")
 
 
-def titled(title: str) -> Callable[[Callable[Given, Iterator[Piece]]], Callable[Given, Section | None]]:
+def titled(title: str) -> Callable[[Callable[P, Iterator[Piece]]], Callable[P, Section | None]]:
     """A section of the pieces that a function yields, None if there are none."""
 
-    def section(tell: Callable[Given, Iterator[Piece]]) -> Callable[Given, Section | None]:
-        @wraps(tell)
-        def told(*args: Given.args, **named: Given.kwargs) -> Section | None:
-            pieces = tuple(tell(*args, **named))
+    def section(write: Callable[P, Iterator[Piece]]) -> Callable[P, Section | None]:
+        @wraps(write)
+        def made(*args: P.args, **named: P.kwargs) -> Section | None:
+            pieces = tuple(write(*args, **named))
             return Section(title, pieces) if pieces else None
 
-        return told
+        return made
 
     return section
 

@@ -3,6 +3,7 @@
 Reading happens in copies of the graph: nothing that is read changes what is compiled.
 """
 
-from .readable import Readable, ReadingView
+from .displayed import Displayed, ReadingView
+from .readable import Readable
 
-__all__ = ["Readable", "ReadingView"]
+__all__ = ["Displayed", "Readable", "ReadingView"]

@@ -24,7 +24,7 @@ from ..mechanics.mobility import Mobility, find_mobility
 from ..model.sympy_face import names_of
 from ..model.visit import Undotted
 from ..runtime.argument_checks import unknown
-from . import Readable
+from . import Displayed
 
 if TYPE_CHECKING:
     from ..codegen.choice import Choice
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
-class Derivation(Record, Readable):
+class Derivation(Record, Displayed):
     """What a derivation gives; :class:`~..api.equations.Equations` says what its attributes are."""
 
     kinematics: Kinematics = field(repr=False)
@@ -94,7 +94,7 @@ class Derivation(Record, Readable):
         return None if system is None else (len(system.unknowns), len(system.places))
 
     # -- display
-    __repr__ = Readable.__repr__
+    __repr__ = Displayed.__repr__
 
     @cached_property
     def _shown_text(self) -> str:
