@@ -166,7 +166,7 @@ def _folded(section: Section | None) -> Section | None:
 
 
 def _module(author: Author) -> tuple[Any, str]:
-    """The module of the equations on NumPy, with the values that were put in, or None and why it has no state."""
+    """The module of the equations on NumPy, with the values that were substituted, or None and why it has no state."""
     equations = author.source
     functions = opaque_names(equations.kinematics.graph)
     if functions:

@@ -706,7 +706,7 @@ def _prescribed(author: Author) -> Iterator[Piece]:
 # -- numbers -----------------------------------------------------------------------------------------------------------
 
 
-LONG = 60  #: nodes of an expression up to which its numbers are put in
+LONG = 60  #: nodes of an expression up to which its numbers are substituted
 MOST = 400  #: lines of the calculation
 
 

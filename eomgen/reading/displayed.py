@@ -1,4 +1,4 @@
-"""Equations -> what notebooks and terminals show of them, and views with values put in."""
+"""Equations -> what notebooks and terminals show of them, and views with values substituted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .readable import Derived, Readable, dynamic_symbols
 
 
 class Displayed(Readable):
-    """Equations that show themselves, and that give the same quantities with values put in or in functions of time."""
+    """Equations that show themselves, and give the same quantities with values substituted or in functions of time."""
 
     # -- display ------------------------------------------------------------------------------------------------------
     def __repr__(self) -> str:
@@ -72,7 +72,7 @@ class Displayed(Readable):
         return ReadingView(self, dynamic_symbols(self.kinematics), self._substituted)
 
     def subs(self, values: Mapping[Any, Any]) -> ReadingView:
-        """The same quantities with values put in, all at once, after derivatives have been taken.
+        """The same quantities with values substituted, all at once, after derivatives have been taken.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Displayed(Readable):
         return ReadingView(self, self._symbol, (*self._substituted, self._read(values)))
 
     def with_parameters(self, values: Mapping[Any, Any] | None = None, /, **named: Any) -> ReadingView:
-        """The same quantities with values of parameters put in: ``with_parameters(l=0.5)``; see :meth:`subs`.
+        """The same quantities with values substituted for parameters: ``with_parameters(l=0.5)``; see :meth:`subs`.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Displayed(Readable):
 
 
 class ReadingView(Displayed):
-    """Equations to read, with values put in or with functions of time; all quantities of :class:`Readable`.
+    """Equations to read, with values substituted or with functions of time; all quantities of :class:`Readable`.
 
     Made by ``subs``, ``with_parameters`` and ``with_dynamicsymbols`` of equations and of other views.
 
@@ -152,14 +152,14 @@ class ReadingView(Displayed):
         return self.source.method
 
     def explain(self, level: str = "full") -> Any:
-        """The worked solution with the values of parameters and inputs that were put in; see ``explain`` of equations.
+        """The worked solution with the substituted values of parameters and inputs; see ``explain`` of equations.
 
         The formulas are compared with the compiled module at these values.
 
         Raises
         ------
         UnavailableError
-            A value was put in for a coordinate, a velocity, an acceleration or the time: the steps of a solution
+            A value was substituted for a coordinate, a velocity, an acceleration or the time: the steps of a solution
             differentiate by them.  Or a value holds a name that is no parameter or input of the model.
         """
         if not self._substituted:

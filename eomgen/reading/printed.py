@@ -187,7 +187,7 @@ class PrintedEquations:
 
     @property
     def values(self) -> list[Formula]:
-        """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
+        """Equations of what was substituted, ``l = 0.5``; a second time for a name with what came later."""
         return [
             Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
             for values in self.equations.values_substituted()
@@ -196,7 +196,7 @@ class PrintedEquations:
 
     @property
     def is_one_equation(self) -> bool:
-        """Whether there is one acceleration, for which nothing was put in."""
+        """Whether there is one acceleration, for which nothing was substituted."""
         return len(self.accelerations) == 1 and isinstance(self.accelerations[0], Name)
 
     @property

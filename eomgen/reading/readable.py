@@ -632,14 +632,14 @@ class Readable(ABC):
         return Formed(whole[: len(flat)], named, extra)
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
-        """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
+        """Expressions of the model with the substituted values, in a graph of their own; as they are without any."""
         result = copied(list(expressions)) if self._substituted else list(expressions)
         for values in self._substituted:
             result = substitute_values(result, values)
         return result
 
     def numbers_substituted(self) -> dict[str, float | None]:
-        """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
+        """Numbers of substituted names, with declared values of what their values hold; None where these have none."""
         m, names = self.kinematics.mechanism, list(dict.fromkeys(name for named in self._substituted for name in named))
         quantities: list[Any] = [*m.parameters, *m.inputs]
         declared = {x.name: x.value for x in quantities if x.value is not None}
@@ -737,26 +737,26 @@ class Readable(ABC):
 
     @property
     def _known(self) -> tuple[str, ...]:
-        """Names for which values can be put in."""
+        """Names for which values can be substituted."""
         return (*self._own, *momentum_names(self.kinematics), *self.names_substituted)
 
     @property
     def names_substituted(self) -> tuple[str, ...]:
-        """Names that the model does not have and that values put in have brought."""
+        """Names that the model does not have and that substituted values have brought."""
         graph = Graph()
         values = (read_value(graph, name, value) for named in self._substituted for name, value in named.items())
         return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
 
     def values_substituted(self) -> list[list[tuple[str, Any]]]:
-        """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
-        return [[(name, self._as_given(value)) for name, value in named.items()] for named in self._substituted]
+        """What was substituted, one list after the other: names, and numbers as they are or SymPy expressions."""
 
-    def _as_given(self, value: Any) -> Any:
-        if isinstance(value, float | int):
-            return value
-        return self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
+        def written(value: Any) -> Any:
+            is_number = isinstance(value, float | int)
+            return value if is_number else self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
+
+        return [[(name, written(value)) for name, value in named.items()] for named in self._substituted]
 
     def symbols_substituted(self, names: Sequence[str]) -> list[Any]:
-        """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
+        """What stands for names after substitution, in SymPy: their symbols, where none were."""
         graph = Graph()
         return self.in_sympy(self.with_values([graph.symbol(name) for name in names])).expressions

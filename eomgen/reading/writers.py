@@ -65,7 +65,7 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
 
 
 def _values(printed: PrintedEquations, columns: int) -> list[str]:
-    """What was put in."""
+    """What was substituted."""
     listed = ", ".join(printed.text(x).replace(" ", TIGHT) for x in printed.values)
     return [plain(line) for line in fold(listed, columns, "  with ", "    ")] if listed else []
 
@@ -319,7 +319,7 @@ def _facts(printed: PrintedEquations) -> Iterator[Piece]:
 
 
 def latex_formulas(equations: Readable, digits: int = DIGITS) -> list[str]:
-    """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
+    """Each formula of the equations of motion, without dollars: M v' = f, its names, and substituted values."""
     printed = PrintedEquations(equations, digits)
     lines = [line for item in printed.items() for line in _latex(item, printed.page_names)]
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
