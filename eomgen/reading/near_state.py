@@ -80,9 +80,7 @@ def _samples(quantities: Quantities, expressions: Sequence[Expr]) -> Iterator[An
     """The expressions at a few values of their symbols; none where they hold functions that are not known here."""
     if quantities.graph.functions:
         return
-    kinematics, left = quantities.kinematics, sorted(symbols_of(expressions))
-    places = zip(kinematics.names, quantities.mobility.q_reference, strict=True)
-    declared = quantities.numbers | {name: x + 0.3 + 0.1 * k for k, (name, x) in enumerate(places)}
+    left, declared = sorted(symbols_of(expressions)), quantities.numbers_elsewhere
     for first in (0.7, 0.4, 1.3):
         made_up = {name: first + 0.17 * k for k, name in enumerate(left)}
         with np.errstate(all="ignore"):

@@ -257,6 +257,12 @@ class Quantities:
         values = {p.name: 1.0 + 0.1 * k if p.value is None else p.value for k, p in enumerate(m.parameters)}
         return values | {u.name: u.value for u in m.inputs} | {"t": 0.0}
 
+    @property
+    def numbers_elsewhere(self) -> dict[str, float]:
+        """The same with a position that is not the reference, where coordinates may be singular."""
+        places = enumerate(zip(self.kinematics.names, self.mobility.q_reference, strict=True))
+        return self.numbers | {name: x + 0.3 + 0.1 * k for k, (name, x) in places}
+
     # -- energies ---------------------------------------------------------------------------------------------------
     def _require_energy(self, what: str, keys: tuple[str, ...]) -> None:
         """Refuse energies of given equations of which none of the keys was given."""
@@ -488,9 +494,7 @@ class Quantities:
         for x, rate in zip(moved, solve_symmetric(self.equations.mass_matrix, moved), strict=True):
             total = total + x * rate
         result = 0.5 * total - at_rest + tree.potential_energy
-        places = enumerate(self.mobility.q_reference)  # somewhere else: coordinates may be singular at the reference
-        numbers = self.numbers | dict(zip(kinematics.names, (x + 0.3 + 0.1 * k for k, x in places), strict=True))
-        if not math.isfinite(float(evaluate([result], numbers | dict.fromkeys(names, 1.0))[0])):
+        if not math.isfinite(float(evaluate([result], self.numbers_elsewhere | dict.fromkeys(names, 1.0))[0])):
             raise UnavailableError(
                 "the mass matrix of the spanning tree has no inverse, so that H is no function of the momenta; give "
                 "every body a mass and an inertia"
