@@ -415,7 +415,7 @@ def _weight(author: Author, name: str) -> Iterator[Piece]:
     """Gravity, and other parts that are no elements."""
     for switch in author.mechanism.switched:
         if switch.constraint is not None and switch.constraint.name == name:
-            yield from _held(author, name, switch)
+            yield from _switched(author, name, switch)
             return
     if name != "gravity":
         yield Sentence(f"`{name}` of the model.")
@@ -426,7 +426,7 @@ def _weight(author: Author, name: str) -> Iterator[Piece]:
     yield author.line(r"\mathbf{g}", sympy.Matrix(3, 1, gravity))
 
 
-def _held(author: Author, name: str, switch: Switched) -> Iterator[Piece]:
+def _switched(author: Author, name: str, switch: Switched) -> Iterator[Piece]:
     """What a constraint that closes and opens demands, and when."""
     assert switch.constraint is not None
     events = {event.name: event for event in author.mechanism.events}

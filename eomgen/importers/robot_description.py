@@ -309,7 +309,7 @@ def _check_masses(robot: Robot, result: Bodies, check: str) -> None:
         robot.problem(f"joint.{joint.name}", message, remedy, joint.place, "EG-NO-INERTIA")
 
 
-SHOWN = 8  #: joints that a note names
+LISTED = 8  #: joints that a note names
 #: Stops of joints: part of the range that one gives way under the drive's effort; what is left of the speed after it.
 GIVE, REBOUND = 0.01, 0.3
 GRAVITY = 9.81  #: m/s^2, of the weight that stands for an effort that is not told
@@ -362,7 +362,7 @@ class _Writer:
     """Fills one Description."""
 
     def __init__(self, robot: Robot, options: RobotOptions, result: Bodies) -> None:
-        self.robot, self.options, self.found = robot, options, result
+        self.robot, self.options, self.tree = robot, options, result
         gravity = robot.gravity if options.gravity is None else options.gravity
         name = clean_name(robot.name, "robot")[:LONGEST]
         name = f"{name[: LONGEST - 6]}_model" if fault_of_model_name(name) else name
@@ -381,12 +381,12 @@ class _Writer:
         self.loads = result.loads()
 
     def describe(self) -> Description:
-        moving = self.found.moving
+        moving = self.tree.moving
         self._bound(sum(len(self._suffixes(joint.type)) for _, joint in moving))
         for _, joint in moving:
             suffixes = [*self._suffixes(joint.type), *self._rates(joint.type)]
             self.joints[joint.name] = self.names.joint(joint.name, suffixes)
-        for body in self.found.bodies.values():
+        for body in self.tree.bodies.values():
             self._body(body)
         for body, joint in moving:
             self._joint(body, joint)
@@ -473,7 +473,7 @@ class _Writer:
 
     def _joint(self, body: RobotBody, joint: RobotJoint) -> None:
         name = self.joints[joint.name]
-        home, frame = self.found.home[joint.parent] if joint.parent else (GROUND, IDENTITY)
+        home, frame = self.tree.home[joint.parent] if joint.parent else (GROUND, IDENTITY)
         parent, child = self.bodies[home], self.bodies[body.name]
         between = [(frame @ joint.outer).reference(parent), joint.inner.reference(child)]
         names = [name + suffix for suffix in self._suffixes(joint.type)]
@@ -590,12 +590,12 @@ class _Writer:
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:
         for loop in self.robot.loops:
-            if not self.found.around(loop):
+            if not self.tree.around(loop):
                 self.out.notes.append(f"left out: {loop.name}, because no joint moves its two links against each other")
                 continue
             pair = []
             for link, frame in (loop.first, loop.second):
-                body, at = self.found.home[link]
+                body, at = self.tree.home[link]
                 pair.append((at @ frame).reference(self.bodies[body]))
             kind = JOINTS[loop.type].kind
             name = self.names.joint(loop.name, [c.suffix for c in kind.coordinates])
@@ -658,15 +658,15 @@ class _Writer:
 
     def _note_data(self) -> None:
         """Say of which joints limits and dry friction are data that do not act."""
-        moving = [joint for _, joint in self.found.moving]
+        moving = [joint for _, joint in self.tree.moving]
         limited = [self.joints[j.name] for j in moving if any(k != "effort" or j.clamp is None for k in j.limits)]
         if limited and self.options.limits == "note":
             remedy = "a run that passes a limit warns; limits='stop' adds elastic stops, limits='off' does not warn"
-            self.out.notes.append(f"joint limits are not enforced ({listing(limited, SHOWN)}); {remedy}")
+            self.out.notes.append(f"joint limits are not enforced ({listing(limited, LISTED)}); {remedy}")
         rubbing = [self.joints[j.name] for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
             remedy = "load with friction=0.01 to let it act"
-            self.out.notes.append(f"the dry friction of joints does not act ({listing(rubbing, SHOWN)}); {remedy}")
+            self.out.notes.append(f"the dry friction of joints does not act ({listing(rubbing, LISTED)}); {remedy}")
 
 
 def _cut(law: str, bounds: Range) -> str:

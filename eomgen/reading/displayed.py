@@ -17,7 +17,7 @@ class Displayed(Readable):
 
     # -- display ------------------------------------------------------------------------------------------------------
     def __repr__(self) -> str:
-        return self._shown_text
+        return self._text
 
     def _repr_html_(self) -> str:
         from .writers import facts_html
@@ -30,7 +30,7 @@ class Displayed(Readable):
         return equations_latex(self)
 
     @cached_property
-    def _shown_text(self) -> str:
+    def _text(self) -> str:
         from .writers import equations_text
 
         return equations_text(self)

@@ -466,8 +466,8 @@ class PrintedParts:
         C, M = of.get(PartMeaning.CONSTRAINT), of[PartMeaning.INERTIA]
         if C is None or not M.is_large:
             return
-        inertia, held = ([[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C))
-        if (blocks := find_blocks(inertia, held, self.equations.constraint_names, self._branches)) is None:
+        inertia, nonzero = ([[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C))
+        if (blocks := find_blocks(inertia, nonzero, self.equations.constraint_names, self._branches)) is None:
             return
         names = [Name(name) for name in self._kinematics.velocity_labels]
         columns = [[names[j] for j in places] for places in blocks.coordinates]
@@ -480,7 +480,9 @@ class PrintedParts:
         yield _row((Letter(M.letter), Matrix(tuple(map(tuple, rows)))))
         rows = [
             [
-                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(held[i][j] for i in r for j in c) else ZERO
+                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}")
+                if any(nonzero[i][j] for i in r for j in c)
+                else ZERO
                 for b, c in enumerate(blocks.coordinates)
             ]
             for a, r in enumerate(blocks.equations)

@@ -78,7 +78,7 @@ Made = TypeVar("Made")  #: what a quantity is
 Derived = tuple[Kinematics, Mobility, TreeEquations]
 #: What equations must have for a display to name a quantity among those to read next.
 ANY, BODIES, PARTS, LOOPS = "any", "bodies", "parts", "loops"
-SHOWN = 8  #: names that a message lists
+LISTED = 8  #: names that a message lists
 
 
 class Quantity(cached_property[Made]):
@@ -717,7 +717,7 @@ class Readable(ABC):
         value = getattr(self, name)
         if table[name].by_name:
             if part is None:
-                there = ", ".join(map(repr, tuple(value)[:SHOWN])) or "there are none"
+                there = ", ".join(map(repr, tuple(value)[:LISTED])) or "there are none"
                 raise incomplete(f"{name!r} are written one by one; give the name of one as part: {there}")
             whole = value[part]
             return self._written[f"{name}.{part if part in tuple(value) else self._plain(part)}"].intermediates, whole
@@ -729,7 +729,7 @@ class Readable(ABC):
         return needed(self._written[name].intermediates, value[part]), value[part]
 
     @property
-    def _own(self) -> tuple[str, ...]:
+    def _model_names(self) -> tuple[str, ...]:
         """Names of coordinates, their derivatives, parameters and inputs, and the time."""
         k = self.kinematics
         rates = (*k.velocity_names, *map(acceleration_name, k.velocity_names))
@@ -738,14 +738,14 @@ class Readable(ABC):
     @property
     def _known(self) -> tuple[str, ...]:
         """Names for which values can be substituted."""
-        return (*self._own, *momentum_names(self.kinematics), *self.names_substituted)
+        return (*self._model_names, *momentum_names(self.kinematics), *self.names_substituted)
 
     @property
     def names_substituted(self) -> tuple[str, ...]:
         """Names that the model does not have and that substituted values have brought."""
         graph = Graph()
         values = (read_value(graph, name, value) for named in self._substituted for name, value in named.items())
-        return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
+        return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._model_names)))
 
     def values_substituted(self) -> list[list[tuple[str, Any]]]:
         """What was substituted, one list after the other: names, and numbers as they are or SymPy expressions."""

@@ -128,8 +128,8 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
         if max(map(len, rows), default=0) <= columns:
             break
 
-    def words(said: Text) -> str:
-        return written(said, lambda x: text(x, parts.names), str, str)
+    def in_text(sentence: Text) -> str:
+        return written(sentence, lambda x: text(x, parts.names), str, str)
 
     def equation(line: FormulaLine) -> Iterator[str]:
         left, right = line.sides
@@ -153,15 +153,15 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
             case Row():
                 yield from (line for one in item.lines for line in equation(one))
             case Sentence():
-                yield from fold(words(item.text), columns, "", "  ")
+                yield from fold(in_text(item.text), columns, "", "  ")
     groups = [item for item in items if isinstance(item, Folded)]
     yield from (
         "",
         "In groups:",
-        *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")),
+        *(line for group in groups for line in fold(in_text(group.title), columns, "  ", "    ")),
     )
     for group in groups:
-        yield from ("", *fold(words(group.title), columns, "", "  "))
+        yield from ("", *fold(in_text(group.title), columns, "", "  "))
         yield from (line for one in group.pieces if isinstance(one, FormulaLine) for line in equation(one))
 
 
