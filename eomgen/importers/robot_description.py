@@ -317,11 +317,6 @@ _PARAMETERS = ("_e0", "_e1", "_e2", "_e3")
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
 
-def describe_robot(robot: Robot, options: RobotOptions) -> Description:
-    """The raw data of a robot; raises ModelError if it has faults."""
-    return _Writer(robot, options, build_bodies(robot, options)).describe()
-
-
 class _Names:
     """Names a model may use, of whatever a robot file calls its links and joints, and what became of each.
 
@@ -358,10 +353,11 @@ class _Names:
         return result
 
 
-class _Writer:
-    """Fills one Description."""
+class RobotWriter:
+    """Fills the Description of a robot; raises ModelError if it has faults."""
 
-    def __init__(self, robot: Robot, options: RobotOptions, result: Bodies) -> None:
+    def __init__(self, robot: Robot, options: RobotOptions) -> None:
+        result = build_bodies(robot, options)
         self.robot, self.options, self.tree = robot, options, result
         gravity = robot.gravity if options.gravity is None else options.gravity
         name = clean_name(robot.name, "robot")[:LONGEST]

@@ -470,7 +470,8 @@ class PrintedParts:
         if (blocks := find_blocks(inertia, nonzero, self.equations.constraint_names, self._branches)) is None:
             return
         names = [Name(name) for name in self._kinematics.velocity_labels]
-        columns = [[names[j] for j in places] for places in blocks.coordinates]
+        places, filled = blocks
+        columns = [[names[j] for j in group] for group in places]
         groups = [x for k, part in enumerate(columns) for x in ("; " if k else "", *listed(part))]
         joints = dict.fromkeys(label.partition(".")[0] for label in self.equations.constraint_names)
         yield Sentence(("In blocks, of the coordinates ", *groups, f", and of the joints {', '.join(joints)}:"))
@@ -479,13 +480,8 @@ class PrintedParts:
         rows = [[x if i == k else ZERO for i in range(len(columns))] for k, x in enumerate(diagonal)]
         yield _row((Letter(M.letter), Matrix(tuple(map(tuple, rows)))))
         rows = [
-            [
-                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}")
-                if any(nonzero[i][j] for i in r for j in c)
-                else ZERO
-                for b, c in enumerate(blocks.coordinates)
-            ]
-            for a, r in enumerate(blocks.equations)
+            [Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if there else ZERO for b, there in enumerate(row)]
+            for a, row in enumerate(filled)
         ]
         yield _row((Letter(C.letter), Matrix(tuple(map(tuple, rows)))))
 
