@@ -123,17 +123,21 @@ class _Code:
         body = {"sympy": self._sympy, "julia": self._julia, "c": self._c}.get(self.form, self._matlab)
         return "\n".join([*(f"{self.language.comment} {note}" for note in notes), *body(), ""])
 
-    def _statements(self, named: str, whole: str, states: str) -> list[str]:
+    def _statements(self, named: str, whole: str, brackets: str, states: str) -> list[str]:
         """Definitions of named parts, of M, of f and of the rates of states."""
+
+        def write(x: Any) -> str:  # one by one: in a list, printers write numbers otherwise
+            return brackets.format(", ".join(map(write, x))) if isinstance(x, list) else self.language.print(x)
+
         lists = {"M": self.mass.tolist(), "f": [*self.force]} | ({states: self.states} if self.states else {})
-        lines = [named.format(symbol, self.language.print(x)) for symbol, x in self.named]
-        return lines + [whole.format(name, self.language.print(entries)) for name, entries in lists.items()]
+        lines = [named.format(symbol, write(x)) for symbol, x in self.named]
+        return lines + [whole.format(name, write(entries)) for name, entries in lists.items()]
 
     def _sympy(self) -> list[str]:
         """Statements that define the symbols too."""
         lines, names = ["import sympy", "from sympy import *"], ", ".join(self.arguments)
         lines += [f"{names}, = symbols({' '.join(self.arguments)!r}, seq=True)"] if names else []
-        return lines + self._statements("{} = {}", "{} = sympy.Matrix({})", "state_rates")
+        return lines + self._statements("{} = {}", "{} = sympy.Matrix({})", "[{}]", "state_rates")
 
     def _body(
         self, line: str, place: Callable[[tuple[int, ...]], str], start: int, zeros: str = "", named: str = ""
@@ -170,7 +174,7 @@ class _Code:
         return ["#include <math.h>", head, "{", *body, "}"]
 
     def _mathematica(self) -> list[str]:
-        return self._statements("{} = {};", "{} = {};", "stateRates")
+        return self._statements("{} = {};", "{} = {};", "{{{}}}", "stateRates")
 
 
 def _renamed(names: Iterable[str], reserved: frozenset[str], form: str) -> dict[str, str]:
