@@ -51,7 +51,7 @@ def titled(title: str) -> Callable[[Callable[P, Iterator[Piece]]], Callable[P, S
 
 @titled("Mechanism")
 def mechanism(author: Author, module: Any | None) -> Iterator[Piece]:
-    """DrawnPicture, topology, joints and loops."""
+    """Picture, topology, joints and loops."""
     m = author.mechanism
     if doc := m.presentation.doc:
         yield Sentence(_plain(doc))
