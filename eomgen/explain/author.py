@@ -48,14 +48,14 @@ class PrintedQuantity(NamedTuple):
 class Author:
     """Writes the quantities of equations as pieces of a document, on request only the equations of motion.
 
-    ``source`` is what was derived, of which the equations may be a view, ``put_in`` the parameters and inputs for which
-    values were put in, and these; None where other parameters leave them open.
+    ``source`` is what was derived, of which the equations may be a view, ``substituted`` the parameters and inputs for
+    which values are substituted, and these; None where other parameters leave them open.
     """
 
     def __init__(self, equations: Any, full: bool) -> None:
         self.equations, self.full = equations, full
         self.source: Any = equations.source if isinstance(equations, ReadingView) else equations
-        self.put_in: Mapping[str, float | None] = equations.numbers_substituted()
+        self.substituted: Mapping[str, float | None] = equations.numbers_substituted()
         self.mechanism = equations.kinematics.mechanism
         self.names: Notation = equations.notation
         self._formula = Formulas(order_of(equations), digits=ROUNDED)
@@ -159,12 +159,16 @@ class Author:
             return [Folded(f"${left}$: {size} terms and factors", tuple(result))]
         return result
 
-    def balance(self, left: Any, right: Any, named: Sequence[tuple[Any, Any]]) -> list[Piece]:
-        """An equation between two expressions, with the named parts that it uses and that were not shown before."""
-        parts = [pair for pair in needed(named, sympy.Matrix([left, right])) if pair not in self._explained]
-        self.names = self.names.with_names(str(symbol) for symbol, _ in parts)
-        self._explained += parts
-        return [*(self.line(*pair) for pair in parts), self.line(left, right)]
+    def balances(self, name: str, part: str, pick: Callable[[Any], list[Any]] = list) -> Iterator[Piece]:
+        """Equations that are no identities, with the named parts that they use and that were not shown before."""
+        named, value = self.equations.written(name, part)
+        self.printed.append(PrintedQuantity(name, part, [], []))
+        for pair in pick(value):
+            if pair.lhs != pair.rhs:
+                parts = [one for one in needed(named, sympy.Matrix(pair.args)) if one not in self._explained]
+                self.names = self.names.with_names(str(symbol) for symbol, _ in parts)
+                self._explained += parts
+                yield from (self.line(*one) for one in (*parts, pair.args))
 
     def line(self, *sides: Any) -> FormulaLine:
         """A line of formulas, each LaTeX, a SymPy expression or matrix, or a number."""

@@ -158,10 +158,10 @@ def compare(author: Author, module: Any) -> Difference:
                 _note(result, f"poses[{part}]", _number(equations, "poses", part, values), pose.ravel(), 1.0)
         keys = {f"{name}[{part}]" if name in each else name: (name, part) for name, part in others}
         for what, key in keys.items():
-            numbers, formed, named = equations.as_formed(*key)
-            _compare_formed(result, what, formed, named, numbers, values)
-        for what, expressions, numbers in author.formed:
-            _compare_formed(result, what, expressions, (), numbers, values)
+            written, formed = equations.as_formed(*key)
+            _compare_formed(result, what, formed.flat, formed.named or (), written, values)
+        for what, expressions, written in author.formed:
+            _compare_formed(result, what, expressions, (), written, values)
     return Difference({name: one.finding().worst for name, one in result.items()}, STATES)
 
 

@@ -14,7 +14,7 @@ from ..base.files import write_whole
 from ..contact.pairs import opaque_names
 from ..errors import EomgenError, MissingDependencyError, bad_file, no_such
 from ..expr.notation import Notation
-from ..reading.document import DrawnPicture, Folded, Piece, Section, write_html, write_markdown, write_tex
+from ..reading.document import DrawnPicture, Section, write_html, write_markdown, write_tex
 
 if TYPE_CHECKING:
     from .author import Author
@@ -93,7 +93,8 @@ class Explanation:
         return path
 
     def _save_tex(self, path: Path) -> None:
-        picture = next(_pictures(self.sections), None)
+        pieces = (piece for section in self.sections for piece in section.pieces)
+        picture = next((piece for piece in pieces if isinstance(piece, DrawnPicture)), None)
         name = f"{path.stem}.png"
         text = write_tex(self.title, self.sections, self._names, None if picture is None else name)
         if picture is not None:
@@ -125,19 +126,8 @@ class Explanation:
         return f"<{self.title}: {len(self.sections)} sections, {verdict}>"
 
 
-def _pictures(sections: Sequence[Section]) -> Any:
-    """All pictures of a document."""
-    pending: list[Piece] = [piece for section in sections for piece in section.pieces]
-    for piece in pending:
-        if isinstance(piece, Folded):
-            pending += piece.pieces
-        if isinstance(piece, DrawnPicture):
-            yield piece
-
-
 def explain(equations: Any, level: str = "full") -> Explanation:
     """See :meth:`eomgen.api.equations.Equations.explain`."""
-    from . import about_methods
     from . import sections as about
     from .author import Author
     from .comparison import compare, moving_state, state_numbers
@@ -151,8 +141,8 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     details: list[Section | None] = []
     if full:
         details += [*about.motion(author), about.constraints(author), *about.forces(author)]
-        details += [about_methods.energies(author), about_methods.steps(author)]
-    final = about_methods.final(author)
+        details += [about.energies(author), about.steps(author)]
+    final = about.final(author)
     numbers: list[Section | None] = [about.states(author), about.counts(author)]
     if full:
         state, moved = {}, False
@@ -163,9 +153,9 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     result = None if module is None else compare(author, module)
     sections += [*map(_folded, details), final, *map(_folded, numbers), about.difference(result, reason)]
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
-    if author.put_in:
-        values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())
-        title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.put_in, values, strict=True))}"
+    if author.substituted:
+        values = ("open" if x is None else f"{x:.6g}" for x in author.substituted.values())
+        title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.substituted, values, strict=True))}"
     kept = [section for section in sections if section is not None]
     return Explanation(title, kept, author.names, None if result is None else result.largest)
 
@@ -176,7 +166,7 @@ def _folded(section: Section | None) -> Section | None:
 
 
 def _module(author: Author) -> tuple[Any, str]:
-    """The module of the equations on NumPy, with the values that were put in, or None and why it has no state."""
+    """The module of the equations on NumPy, with the values that were substituted, or None and why it has no state."""
     equations = author.source
     functions = opaque_names(equations.kinematics.graph)
     if functions:
@@ -186,7 +176,7 @@ def _module(author: Author) -> tuple[Any, str]:
 
     k = equations.kinematics
     try:
-        values = {name: value for name, value in author.put_in.items() if value is not None}
+        values = {name: value for name, value in author.substituted.items() if value is not None}
         p, u = ({n: values[n] for n in names if n in values} for names in (k.parameter_names, k.input_names))
         module = BoundModel(compile_core(equations, "numpy"), p or None, u or None)
         module.x0()

@@ -1,10 +1,11 @@
-"""The mechanism, its motion, its forces, and the formulas line by line at one state."""
+"""The mechanism, its motion, its forces, the steps of the method, and the formulas line by line at one state."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial, wraps
+from typing import Any, ParamSpec
 
 import sympy
 
@@ -14,8 +15,11 @@ from ..elements.constraints.constraint import event_of
 from ..elements.frames import GROUND, axis_word
 from ..errors import EomgenError, UnavailableError
 from ..expr.core import Expr
+from ..expr.differentiate import gradient
+from ..expr.notation import dotted
 from ..model.mechanism import JointSpec, Switched
 from ..reading.document import DrawnPicture, Folded, FormulaLine, Piece, Section, Sentence, Table
+from ..reading.quantities import Quantities, needed
 from .author import Author, nodes
 from .comparison import Difference, is_rounding, known_values, value_of
 
@@ -24,36 +28,51 @@ from .comparison import Difference, is_rounding, known_values, value_of
 
 _AXIS = re.compile(r"\{([xyz])\}")  #: stands in sentences and formulas of joints for an axis of the joint
 _UNIT = re.compile(r"\\mathbf\{e\}_\{(\\mathbf\{n\}_[xyz])\}")  #: e along an axis n, which is n itself
+MEASURED = {"angle": "angle (rad)", "length": "displacement (m)", "parameter": "Euler parameter"}
 MANY = 2  #: bodies beyond which their masses are folded, and parameters beyond which their values are
 
 
-def mechanism(author: Author, module: Any | None) -> Section:
-    """DrawnPicture, topology, joints and loops."""
+P = ParamSpec("P")
+
+
+def titled(title: str) -> Callable[[Callable[P, Iterator[Piece]]], Callable[P, Section | None]]:
+    """A section of the pieces that a function yields, None if there are none."""
+
+    def section(write: Callable[P, Iterator[Piece]]) -> Callable[P, Section | None]:
+        @wraps(write)
+        def made(*args: P.args, **named: P.kwargs) -> Section | None:
+            pieces = tuple(write(*args, **named))
+            return Section(title, pieces) if pieces else None
+
+        return made
+
+    return section
+
+
+@titled("Mechanism")
+def mechanism(author: Author, module: Any | None) -> Iterator[Piece]:
+    """Picture, topology, joints and loops."""
     m = author.mechanism
-    pieces: list[Piece] = []
     if doc := m.presentation.doc:
-        pieces.append(Sentence(_plain(doc)))
+        yield Sentence(_plain(doc))
     if m.bare:
         kind = "a Lagrangian" if m.lagrangian is not None else "equations of motion"
-        pieces.append(Sentence(f"The model is {kind}, so there are no bodies to draw."))
-        return Section("Mechanism", tuple(pieces))
-    pieces.append(_picture(module))
+        yield Sentence(f"The model is {kind}, so there are no bodies to draw.")
+        return
+    yield _picture(module)
     report = author.source.report
     cut = report.loop_joints
     loops = f"; joint{'s' * (len(cut) > 1)} {_names(cut)} close{'s a loop' if len(cut) == 1 else ' loops'}"
-    pieces.append(
-        Sentence(
-            f"The mechanism has {_count(len(m.bodies), 'body', 'bodies')} beside ground ({_names(report.bodies)}) and "
-            f"{_count(len(m.joints), 'joint')}{loops if cut else ', which form an open tree'}."
-        )
+    yield Sentence(
+        f"The mechanism has {_count(len(m.bodies), 'body', 'bodies')} beside ground ({_names(report.bodies)}) and "
+        f"{_count(len(m.joints), 'joint')}{loops if cut else ', which form an open tree'}."
     )
     rows = tuple(
         (f"`{s.name}`", s.joint.type_name, f"`{s.predecessor.label}`", f"`{s.successor.label}`", _axis(s), allowed)
         for s, allowed in ((spec, str(spec.joint.allows)) for spec in m.joints)
     )
-    pieces.append(Table(("joint", "type", "from (P)", "to (S)", "axis", "degrees of freedom"), rows))
-    pieces += [Sentence(text) for text in dict.fromkeys(map(_joint, m.joints))]
-    return Section("Mechanism", tuple(pieces))
+    yield Table(("joint", "type", "from (P)", "to (S)", "axis", "degrees of freedom"), rows)
+    yield from map(Sentence, dict.fromkeys(map(_joint, m.joints)))
 
 
 def _joint(spec: JointSpec) -> str:
@@ -96,12 +115,8 @@ def bodies(author: Author) -> Section | None:
     if m.bodies:
         axis, within = author.plane, author.within
         J = r"\mathbf{J}" if axis is None else "J"
-        pieces.append(
-            Sentence(
-                "For each body: mass $m$ (kg), centre of mass $\\mathbf{c}$ (m) from the body's origin, and inertia "
-                f"${J}$ (kg m²) about the centre of mass, both in the body's axes."
-            )
-        )
+        text = "For each body: mass $m$ (kg), centre of mass $\\mathbf{c}$ (m) from the body's origin, and inertia "
+        pieces.append(Sentence(f"{text}${J}$ (kg m²) about the centre of mass, both in the body's axes."))
         formulas: list[Piece] = []
         for body in m.bodies:
             properties = [body.mass, *body.com, *(x for row in body.inertia for x in row)]
@@ -112,8 +127,7 @@ def bodies(author: Author) -> Section | None:
                 formulas.append(author.line(author.of(r"\mathbf{c}", body.name), centre))
             if any(x != 0 for x in rest[3:]):
                 inertia = sympy.Matrix(3, 3, rest[3:])
-                inertia_term = ("J", inertia[axis, axis]) if axis is not None else (r"\mathbf{J}", inertia)
-                formulas.append(author.line(author.of(inertia_term[0], body.name), inertia_term[1]))
+                formulas.append(author.line(author.of(J, body.name), inertia if axis is None else inertia[axis, axis]))
         if len(m.bodies) > MANY or not author.full:
             pieces.append(Folded(f"Masses and inertias of {_count(len(m.bodies), 'body', 'bodies')}", tuple(formulas)))
         else:
@@ -124,9 +138,9 @@ def bodies(author: Author) -> Section | None:
             (
                 f"${author.symbol(p.name)}$",
                 f"`{p.name}`",
-                _value(author.put_in.get(p.name, p.value)),
+                _value(author.substituted.get(p.name, p.value)),
                 _plain(p.unit),
-                (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
+                (_plain(p.doc) or kind) + (", value put in" if p.name in author.substituted else ""),
             )
             for p, kind in symbols
         )
@@ -145,7 +159,8 @@ def _value(value: float | None) -> str:
     return "none" if value is None else f"{value:.6g}"
 
 
-def coordinates(author: Author) -> Section:
+@titled("Coordinates")
+def coordinates(author: Author) -> Iterator[Piece]:
     """Each coordinate: what it measures, and whether it is independent."""
     eqs, m = author.equations, author.mechanism
     free = set(eqs.independent)
@@ -154,9 +169,7 @@ def coordinates(author: Author) -> Section:
     for spec in m.joints:
         for name, coordinate in zip(spec.coordinates, spec.joint.coordinates, strict=True):
             start, end = (_place(m, marker) for marker in (spec.predecessor, spec.successor))
-            kind = {"angle": "angle (rad)", "length": "displacement (m)", "parameter": "Euler parameter"}[
-                coordinate.kind
-            ]
+            kind = MEASURED[coordinate.kind]
             role = "independent" if name in free else "dependent" if name in tree else "at a joint that closes a loop"
             rows.append(
                 (f"${author.symbol(name)}$", f"`{name}`", role, f"{kind} of {end} against {start}, joint `{spec.name}`")
@@ -166,16 +179,13 @@ def coordinates(author: Author) -> Section:
         if f"`{name}`" not in known:
             role = "independent" if name in free else "dependent"
             rows.append((f"${author.symbol(name)}$", f"`{name}`", role, "coordinate of the model"))
-    pieces: list[Piece] = [
-        Sentence(
-            f"The tree has {_count(len(tree), 'coordinate')}"
-            + (f", and joints that close loops have {_count(len(loop), 'further one')}" if loop else "")
-            + f". The equations of motion are for {_count(len(free), 'independent one')}"
-            + (f": {', '.join(f'${author.symbol(n)}$' for n in eqs.independent)}." if free else ".")
-        ),
-        Table(("symbol", "name", "role", "what it measures"), tuple(rows)),
-    ]
-    return Section("Coordinates", tuple(pieces))
+    yield Sentence(
+        f"The tree has {_count(len(tree), 'coordinate')}"
+        + (f", and joints that close loops have {_count(len(loop), 'further one')}" if loop else "")
+        + f". The equations of motion are for {_count(len(free), 'independent one')}"
+        + (f": {', '.join(f'${author.symbol(n)}$' for n in eqs.independent)}." if free else ".")
+    )
+    yield Table(("symbol", "name", "role", "what it measures"), tuple(rows))
 
 
 def _place(m: Any, marker: Any) -> str:
@@ -242,47 +252,42 @@ def motion(author: Author) -> list[Section]:
     ]
 
 
-def constraints(author: Author) -> Section:
+@titled("Constraints and degrees of freedom")
+def constraints(author: Author) -> Iterator[Piece]:
     """Constraint equations, their derivatives, degrees of freedom, and where the partition fails."""
     eqs = author.equations
     rows, n = eqs.constraint_names, len(eqs.kinematics.velocity_names)
-    free = eqs.mobility.n_dof
+    freedoms = f"{_count(eqs.mobility.n_dof, 'degree')} of freedom"
     if not rows:
         text = f"There are no constraint equations: all {n} velocities are independent, and the system has "
-        return Section("Constraints and degrees of freedom", (Sentence(f"{text}{_freedoms(free)}."),))
-    pieces: list[Piece] = [
-        Sentence(
-            f"{len(rows)} independent equation{' constrains' if len(rows) == 1 else 's constrain'} the {n} velocities "
-            f"of the tree, which leaves {n} - {len(rows)} = {_freedoms(free)}. "
-            f"{'It is' if len(rows) == 1 else 'They are'} {', '.join(f'`{row}`' for row in rows)}."
-        )
-    ]
+        yield Sentence(f"{text}{freedoms}.")
+        return
+    yield Sentence(
+        f"{len(rows)} independent equation{' constrains' if len(rows) == 1 else 's constrain'} the {n} velocities "
+        f"of the tree, which leaves {n} - {len(rows)} = {freedoms}. "
+        f"{'It is' if len(rows) == 1 else 'They are'} {', '.join(f'`{row}`' for row in rows)}."
+    )
     for element in author.mechanism.constraints:
-        pieces.append(Sentence(f"`{element.name}`: {element.sentence} ${element.formula}$"))
+        yield Sentence(f"`{element.name}`: {element.sentence} ${element.formula}$")
     if eqs.mobility.redundant:
-        pieces.append(Sentence(f"{len(eqs.mobility.redundant)} further equations follow from these and are left out."))
+        yield Sentence(f"{len(eqs.mobility.redundant)} further equations follow from these and are left out.")
     if len(eqs.constraints):
-        pieces += author.quantity(r"\mathbf{C}", "constraints")
-        pieces.append(Sentence("$\\mathbf{C} = \\mathbf{0}$ at every position. Its derivative by the time is"))
+        yield from author.quantity(r"\mathbf{C}", "constraints")
+        yield Sentence("$\\mathbf{C} = \\mathbf{0}$ at every position. Its derivative by the time is")
     if len(eqs.constraints) < len(rows):
-        pieces.append(Sentence("The last equations hold velocities (nonholonomic): they vanish as well."))
-    pieces += author.quantity(r"\dot{\mathbf{C}}", "velocity_constraints")
-    pieces.append(Sentence("The Jacobian $\\mathbf{C}_q$ is the derivative of $\\dot{\\mathbf{C}}$ by the velocities:"))
-    pieces += author.quantity(r"\mathbf{C}_q", "constraint_jacobian")
-    pieces.append(Sentence(_second_derivative(eqs.kinematics.constraints.stabilised)))
-    pieces += author.quantity(r"\boldsymbol{\gamma}", "gamma")
-    pieces += _dead_centres(author)
-    if free:
-        pieces.append(
-            Sentence(
-                "All velocities follow from the independent ones: $\\dot{\\mathbf{q}} = \\mathbf{B} "
-                "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with"
-            )
-        )
-        pieces += author.quantity(r"\mathbf{B}", "velocity_transformation")
+        yield Sentence("The last equations hold velocities (nonholonomic): they vanish as well.")
+    yield from author.quantity(r"\dot{\mathbf{C}}", "velocity_constraints")
+    yield Sentence("The Jacobian $\\mathbf{C}_q$ is the derivative of $\\dot{\\mathbf{C}}$ by the velocities:")
+    yield from author.quantity(r"\mathbf{C}_q", "constraint_jacobian")
+    yield Sentence(_second_derivative(eqs.kinematics.constraints.stabilised))
+    yield from author.quantity(r"\boldsymbol{\gamma}", "gamma")
+    yield from _dead_centres(author)
+    if eqs.mobility.n_dof:
+        text = "All velocities follow from the independent ones: $\\dot{\\mathbf{q}} = \\mathbf{B} "
+        yield Sentence(text + "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with")
+        yield from author.quantity(r"\mathbf{B}", "velocity_transformation")
         if any(x != 0 for x in eqs.velocity_offset):
-            pieces += author.quantity(r"\mathbf{b}", "velocity_offset")
-    return Section("Constraints and degrees of freedom", tuple(pieces))
+            yield from author.quantity(r"\mathbf{b}", "velocity_offset")
 
 
 def _second_derivative(stabilised: tuple[float, float] | None) -> str:
@@ -298,32 +303,28 @@ def _second_derivative(stabilised: tuple[float, float] | None) -> str:
     )
 
 
-def _freedoms(number: int) -> str:
-    return f"{number} degree{'' if number == 1 else 's'} of freedom"
-
-
-def _dead_centres(author: Author) -> list[Piece]:
+def _dead_centres(author: Author) -> Iterator[Piece]:
     """The determinant of the columns of dependent velocities, whose zeros are dead centres."""
     eqs = author.equations
     labels = eqs.kinematics.velocity_labels
     dependent = [k for k, label in enumerate(labels) if label not in eqs.independent]
     names = ", ".join(f"${author.symbol(eqs.kinematics.velocity_names[k])}$" for k in dependent)
     if len(dependent) != len(eqs.constraint_names):
-        return []
-    axes_text = Sentence(
+        return
+    yield Sentence(
         f"The columns of the dependent velocities ({names}) form the square block $\\mathbf{{C}}_d$. Where its "
         "determinant vanishes, the mechanism is at a dead centre: the independent velocities do not determine the "
         "others there, and other coordinates must be chosen as independent."
     )
     if len(dependent) > EXPANDED:
-        return [axes_text]
+        return
 
     def choose(quantities: Any) -> list[Expr]:
         block = [[row[k] for k in dependent] for row in quantities.constraint_jacobian]
         return [_determinant(block)]
 
     named, (value,) = author.form("determinant of the dependent columns", choose, "d_")
-    return [axes_text, *author.formulas(r"\mathrm{det} \mathbf{C}_d", value, named)]
+    yield from author.formulas(r"\mathrm{det} \mathbf{C}_d", value, named)
 
 
 def _determinant(rows: list[list[Expr]]) -> Expr:
@@ -363,7 +364,7 @@ def forces(author: Author) -> list[Section]:
     result = [Section("Forces and their virtual work", (Sentence(text),))]
     elements = {force.name: force for force in m.forces}
     for name, column in parts.items():
-        pieces = _law(author, elements[name]) if name in elements else _weight(author, name)
+        pieces = [*(_law(author, elements[name]) if name in elements else _weight(author, name))]
         if not any(x != 0 for x in column):
             pieces.append(Sentence("Its virtual work vanishes: it does not act along the independent coordinates."))
         else:
@@ -373,24 +374,24 @@ def forces(author: Author) -> list[Section]:
     return result
 
 
-def states(author: Author) -> Section | None:
+@titled("First-order states")
+def states(author: Author) -> Iterator[Piece]:
     """The rates of the first-order states, None without any."""
     k = author.equations.kinematics
     sampled = k.mechanism.sampled_names
     rates = [(name, x) for name, x in zip(k.state_names, k.state_rates, strict=True) if name not in sampled]
     if not k.state_names:
-        return None
-    text = "Besides coordinates and velocities the model has states with these first-order equations."
-    pieces: list[Piece] = [Sentence(text), *_lines(author, "rates of first-order states", rates, "S_", "_dot")]
+        return
+    lines = [*_lines(author, "rates of first-order states", rates, "S_", "_dot")]
+    if rates:
+        yield Sentence("Besides coordinates and velocities the model has states with these first-order equations.")
+        yield from lines
     if k.sampled:
-        axes_text = (
-            "These states are sampled: they keep their values until the time t, where they become, one after the other,"
-        )
-        pieces = pieces if rates else []
-        pieces += [Sentence(axes_text), *_lines(author, "new values of sampled states", k.sampled, "D_")]
+        text = "These states are sampled: they keep their values until the time t, where they become, one after the "
+        yield Sentence(f"{text}other,")
+        yield from _lines(author, "new values of sampled states", k.sampled, "D_")
         counters = ", ".join(f"`{clock.counter}`" for clock in k.mechanism.clocks)
-        pieces.append(Sentence(f"Each time {counters} grows by 1."))
-    return Section("First-order states", tuple(pieces))
+        yield Sentence(f"Each time {counters} grows by 1.")
 
 
 def _lines(
@@ -410,88 +411,332 @@ def _work(author: Author, column: Any) -> Any:
     return sympy.Add(*(x * author.variation(name) for x, name in total))
 
 
-def _weight(author: Author, name: str) -> list[Piece]:
+def _weight(author: Author, name: str) -> Iterator[Piece]:
     """Gravity, and other parts that are no elements."""
     for switch in author.mechanism.switched:
         if switch.constraint is not None and switch.constraint.name == name:
-            return _held(author, name, switch)
+            yield from _switched(author, name, switch)
+            return
     if name != "gravity":
-        return [Sentence(f"`{name}` of the model.")]
+        yield Sentence(f"`{name}` of the model.")
+        return
     gravity = author.write("gravity", list(author.mechanism.gravity)).expressions
-    return [
-        Sentence(
-            "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta \\mathbf{r}_c$, "
-            "with the field of gravity in ground axes"
-        ),
-        author.line(r"\mathbf{g}", sympy.Matrix(3, 1, gravity)),
-    ]
+    text = "The weight of each body acts at its centre of mass, $\\delta W = m \\mathbf{g}^T \\delta \\mathbf{r}_c$, "
+    yield Sentence(f"{text}with the field of gravity in ground axes")
+    yield author.line(r"\mathbf{g}", sympy.Matrix(3, 1, gravity))
 
 
-def _held(author: Author, name: str, switch: Switched) -> list[Piece]:
+def _switched(author: Author, name: str, switch: Switched) -> Iterator[Piece]:
     """What a constraint that closes and opens demands, and when."""
     assert switch.constraint is not None
     events = {event.name: event for event in author.mechanism.events}
-    axes_text = f"{switch.constraint.sentence} This holds for a time, while `{switch.state}` is 1; else its force is 0."
-    pieces: list[Piece] = [Sentence(axes_text)]
+    text = f"{switch.constraint.sentence} This holds for a time, while `{switch.state}` is 1; else its force is 0."
+    yield Sentence(text)
     for key, what in (("closes", "It closes by a plastic impact"), ("opens", "It opens")):
         if (event := events.get(event_of(name, key))) is not None:
             (value,) = author.write("events", [event.expression]).expressions
-            pieces += [
-                Sentence(f"{what} where this falls to 0:"),
-                author.line(rf"\mathrm{{{what.split()[1]}}}", value),
-            ]
-    return pieces
+            yield Sentence(f"{what} where this falls to 0:")
+            yield author.line(rf"\mathrm{{{what.split()[1]}}}", value)
 
 
-def _law(author: Author, force: Any) -> list[Piece]:
+def _law(author: Author, force: Any) -> Iterator[Piece]:
     """The sentence and the formula of an element's type, and what its letters are."""
-    pieces: list[Piece] = [Sentence(" ".join([force.sentence, *(f"${formula}$" for formula in force.formulas)]))]
+    yield Sentence(" ".join([force.sentence, *(f"${formula}$" for formula in force.formulas)]))
     for part in (force, *force.laws):
         for key, value in vars(part).items():
             if isinstance(value, Expr) and not key.startswith("_"):
                 (expression,) = author.write("laws of force elements", [value]).expressions
-                pieces.append(author.line(rf"\mathrm{{{key.replace('_', '.')}}}", expression))
-    return pieces
+                yield author.line(rf"\mathrm{{{key.replace('_', '.')}}}", expression)
+
+
+# -- steps of each method of derivation --------------------------------------------------------------------------------
+
+
+@titled("Energies")
+def energies(author: Author) -> Iterator[Piece]:
+    """T and V, of every method."""
+    if author.mechanism.written is not None:
+        return
+    T, V = author.letter("T"), author.letter("V")
+    text = f"Kinetic energy ${T}$ and potential energy ${V}$ of gravity and springs (J):"
+    if author.mechanism.lagrangian is not None:
+        text = f"${T}$ holds the terms of the Lagrangian of second degree in the velocities, ${V}$ those of degree 0 "
+        text += "with the other sign (J):"
+    yield Sentence(text)
+    yield from author.quantity(T, "T")
+    yield from author.quantity(V, "V")
+
+
+def steps(author: Author) -> Section | None:
+    """The section of the method by which the equations were derived."""
+    method = author.equations.method
+    if author.mechanism.lagrangian is not None and method not in ("hamilton", "augmented"):
+        method = "lagrange"
+    if method not in STEPS or not author.equations.mobility.n_dof:
+        return None
+    title, tell = STEPS[method]
+    return Section(title, tuple(tell(author)))
+
+
+def _embedding(author: Author) -> Iterator[Piece]:
+    axis = author.plane
+    kept = range(6) if axis is None else [*author.within, 3 + axis]
+
+    def each(letter: str, what: str, columns: bool) -> Iterator[Piece]:
+        for k, body in enumerate(author.mechanism.bodies):
+            at = [6 * k + i for i in kept]
+            pick = partial(_part, at, at if columns else None)
+            yield from author.quantity(author.of(letter, body.name), what, pick=pick)
+
+    yield Sentence(
+        "Of each body, $\\mathbf{v}$ holds the velocity of its centre of mass, in ground axes, and its angular "
+        f"velocity{' in its own axes' if axis is None else ''}. They are $\\mathbf{{v}} = \\mathbf{{B}} "
+        "\\dot{\\mathbf{q}}_i + \\mathbf{b}$ with the velocity transformation of the body"
+    )
+    yield from each(r"\mathbf{B}", "body_velocity_transformation", False)
+    yield Sentence("The mass and the inertia of each body, in the same order, form its mass matrix")
+    yield from each(r"\mathbf{M}", "body_mass_matrix", True)
+    yield Sentence("The mass matrix of the independent accelerations is the sum over all bodies")
+    yield author.line(r"\mathbf{M}", r"\mathbf{B}_1^T \mathbf{M}_1 \mathbf{B}_1 + \ldots")
+    yield Sentence(
+        "The part of the accelerations of the bodies that holds no $\\ddot{\\mathbf{q}}_i$ and their gyroscopic "
+        "moments give the quadratic velocity terms $\\mathbf{Q}_v$. The generalized forces of all elements are "
+        "together $\\mathbf{Q}$:"
+    )
+    yield from _right_side(author)
+
+
+def _part(rows: list[int], columns: list[int] | None, whole: Any) -> Any:
+    """Some rows and columns of a matrix; all columns by default."""
+    return whole[rows, :] if columns is None else whole[rows, columns]
+
+
+def _right_side(author: Author) -> Iterator[Piece]:
+    yield from author.quantity(r"\mathbf{Q}_v", "quadratic_velocity")
+    yield from author.quantity(r"\mathbf{Q}", "generalized_forces", pick=lambda total: sympy.Matrix(list(total)))
+    yield Sentence("The right side of the equations of motion is $\\mathbf{Q} + \\mathbf{Q}_v$.")
+
+
+def _lagrange(author: Author) -> Iterator[Piece]:
+    k = author.equations.kinematics
+    T, L, V = map(author.letter, "TLV")
+    bare = k.mechanism.lagrangian is not None
+    T, rest = (L, "") if bare else (T, f" + \\frac{{\\partial {V}}}{{\\partial q}}")
+    yield Sentence(
+        "Lagrange's equations, one for each coordinate $q$ of the tree: $\\frac{d}{d\\,t} "
+        f"\\frac{{\\partial {T}}}{{\\partial\\dot{{q}}}} - \\frac{{\\partial {T}}}{{\\partial q}}{rest} = "
+        "Q_q$, where $Q_q$ holds the forces without a potential"
+        + (" and those of the constraints." if author.equations.constraint_names else ".")
+    )
+    if bare:
+        yield from author.quantity(L, "lagrangian")
+    for j, name in enumerate(k.names):
+        if k.velocity_names[j : j + 1] != (f"{name}_dot",):
+            yield Sentence("Coordinates that are no angles or lengths follow from their angular velocities.")
+            break
+        q = author.symbol(name)
+        for left, choose in _derivatives(q, j, T, None if bare else V):
+            named, (value,) = author.form("derivatives of energies", choose, "d_")
+            yield from author.formulas(left, value, named)
+    if k.velocity_names and author.equations.constraint_names:
+        yield Sentence("Multiplied by $\\mathbf{B}^T$, these equations lose the forces of the constraints:")
+        yield from author.quantity(r"\mathbf{B}", "velocity_transformation")
+
+
+def _derivatives(q: str, j: int, T: str, V: str | None) -> list[tuple[str, Callable[[Quantities], Sequence[Expr]]]]:
+    """Left sides and values of the derivatives of the energies by coordinate j; without V of the Lagrangian T."""
+    partial_rate = rf"\frac{{\partial {T}}}{{\partial{dotted(q, 1)}}}"
+
+    def slope(letter: str, of: Callable[[Quantities], Expr]) -> tuple[str, Callable[[Quantities], Sequence[Expr]]]:
+        return rf"\frac{{\partial {letter}}}{{\partial {q}}}", lambda s: gradient(of(s), [s.kinematics.q[j]])
+
+    return [
+        (partial_rate, lambda s: [s.momenta[j]]),
+        (rf"\frac{{d}}{{d\,t}} {partial_rate}", lambda s: s.kinematics.total_derivative([s.momenta[j]])),
+        slope(T, lambda s: s.T if V else s.lagrangian),
+        *([slope(V, lambda s: s.V)] if V else []),
+    ]
+
+
+def _newton_euler(author: Author) -> Iterator[Piece]:
+    yield Sentence(
+        "Each body is set free. In ground axes, its mass times the acceleration of its centre of mass is the sum of "
+        "all forces on it, and the rate of its angular momentum is the sum of their moments about the centre of mass. "
+        "Symbols with the name of a joint are the components of its force and its moment on the body that it carries."
+    )
+    for name in author.equations.free_bodies:
+        yield Sentence(f"`{name}`:")
+        yield from author.balances("free_bodies", name, lambda body: [*body.force, *body.moment])
+    yield Sentence("Along the directions in which a joint is free, its reaction is what drives and forces give:")
+    for name in author.equations.joint_forces:
+        yield from author.balances("joint_forces", name)
+    yield from _block(author)
+
+
+def _block(author: Author) -> Iterator[Piece]:
+    """The linear system of a method that keeps reactions as unknowns."""
+    named, system = author.equations.written("block_system")
+    unknowns = ", ".join(f"${author.symbol(str(x))}$" for x in system.unknowns)
+    yield Sentence(
+        f"Together they are one linear system $\\mathbf{{K}} \\mathbf{{x}} = \\mathbf{{k}}$ for the "
+        f"{len(system.unknowns)} unknowns {unknowns}:"
+    )
+    yield from author.formulas(r"\mathbf{K}", system.matrix, named, ("block_system", "matrix"))
+    yield from author.formulas(r"\mathbf{k}", system.right, named, ("block_system", "right"))
+
+
+def _augmented(author: Author) -> Iterator[Piece]:
+    yield Sentence(
+        "The accelerations of the tree and the multipliers $\\boldsymbol{\\lambda}$ of the constraints are the "
+        "unknowns: $\\mathbf{M}_t \\ddot{\\mathbf{q}} + \\mathbf{C}_q^T \\boldsymbol{\\lambda} = \\mathbf{Q} + "
+        "\\mathbf{Q}_v$ and $\\mathbf{C}_q \\ddot{\\mathbf{q}} = -\\boldsymbol{\\gamma}$."
+    )
+    yield from _block(author)
+
+
+def _gibbs_appell(author: Author) -> Iterator[Piece]:
+    S = author.letter("S")
+    yield Sentence(
+        f"The Gibbs function ${S}$ is half the sum of mass times the square of acceleration over all bodies; what is "
+        "free of accelerations is left out, because only derivatives by accelerations are needed:"
+    )
+    yield from author.quantity(S, "gibbs_function")
+    yield Sentence(
+        "Its derivatives by the accelerations are the generalized forces: "
+        f"$\\frac{{\\partial {S}}}{{\\partial\\ddot{{q}}}} = Q_q$."
+    )
+    yield from _right_side(author)
+
+
+def _hamilton(author: Author) -> Iterator[Piece]:
+    symbols = ", ".join(f"${author.symbol(str(p))}$" for p in author.equations.momentum_symbols)
+    L, H = map(author.letter, "LH")
+    yield Sentence(f"The momenta {symbols} are the derivatives of ${L}$ by the velocities:")
+    yield from author.quantity(r"\mathbf{p}", "momenta")
+    text = f"The Hamiltonian is ${H} = \\mathbf{{p}}^T \\dot{{\\mathbf{{q}}}} - {L}$, in coordinates and momenta:"
+    yield Sentence(text)
+    yield from author.quantity(H, "hamiltonian")
+    text = f"The rates of the momenta are $\\dot{{p}} = -\\frac{{\\partial {H}}}{{\\partial q}} + Q_q$; written in "
+    yield Sentence(f"{text}velocities:")
+    yield from author.quantity(r"\dot{\mathbf{p}}", "momentum_rates")
+
+
+def _recursive(author: Author) -> Iterator[Piece]:
+    k = author.equations.kinematics
+    yield Sentence(
+        "From ground outwards, the velocity of each link is that of the link that carries it plus that of its joint, "
+        "$\\mathbf{v}_j = \\mathbf{X}_j \\mathbf{v}_p + \\mathbf{S}_j \\dot{q}_j$, each in the axes of the link; its "
+        "wrench is $\\mathbf{f}_j = \\mathbf{I}_j \\mathbf{a}_j + \\mathbf{v}_j^{\\ast} \\mathbf{I}_j \\mathbf{v}_j$. "
+        "From the last link inwards, wrenches and inertias of the links that a link carries are added to its own."
+    )
+    for place, branch in enumerate(k.topology.branches):
+        body, joint = k.mechanism.bodies[branch.body].name, k.mechanism.joints[branch.joint]
+        below = "ground" if branch.parent < 0 else f"`{k.mechanism.bodies[branch.parent].name}`"
+        yield Sentence(f"Link {place + 1} is `{body}`, carried by {below} through joint `{joint.name}`:")
+        named, flat = author.form("velocities of links", partial(_twist, place), "w_")
+        yield from author.formulas(author.of(r"\mathbf{v}", body), sympy.Matrix(6, 1, flat), named)
+    if author.equations.constraint_names:
+        yield Sentence("The equations of the tree are then multiplied by $\\mathbf{B}^T$ of the constraints:")
+        yield from author.quantity(r"\mathbf{B}", "velocity_transformation")
+    yield from _right_side(author)
+
+
+def _twist(place: int, quantities: Quantities) -> list[Expr]:
+    """Angular velocity and velocity of the origin of a link, in its axes."""
+    return [x for part in quantities.kinematics.twists[place] for x in part]
+
+
+#: Method -> title of its section, and what tells it.
+STEPS: dict[str, tuple[str, Callable[[Author], Iterator[Piece]]]] = {
+    "embedding": ("Embedding technique", _embedding),
+    "lagrange": ("Lagrange's equations", _lagrange),
+    "newton_euler": ("Newton's and Euler's equations of the free bodies", _newton_euler),
+    "amalgamated": ("Equations of the free bodies in one system", _newton_euler),
+    "gibbs_appell": ("Equations of Gibbs and Appell", _gibbs_appell),
+    "hamilton": ("Hamilton's equations", _hamilton),
+    "augmented": ("Augmented system with multipliers", _augmented),
+    "recursive": ("Recursion along the links", _recursive),
+}
+
+
+@titled("Equations of motion")
+def final(author: Author) -> Iterator[Piece]:
+    """The equations of motion."""
+    eqs = author.equations
+    rates = [author.symbol(name) for name in eqs.acceleration_names]
+    if not rates:
+        yield from _prescribed(author)
+        return
+    try:
+        named, mass, force = eqs.intermediates, eqs.mass_matrix, eqs.force
+    except UnavailableError as error:
+        yield Sentence(str(error).partition("\n")[0])
+        return
+    one = len(mass) == 1
+    left, right = map(author.letter, "Mf") if one else (r"\mathbf{M}", r"\mathbf{f}")
+    text = f"${left} {rates[0]} = {right}$ with"
+    if not one:
+        listed = ", ".join(f"${x}$" for x in rates)
+        text = f"$\\mathbf{{M}} \\ddot{{\\mathbf{{q}}}}_i = \\mathbf{{f}}$ for the accelerations {listed}, with"
+    formulas = author.formulas(left, mass, named, ("mass_matrix", None), True)
+    known = set() if isinstance(formulas[0], Sentence) else {symbol for symbol, _ in needed(named, mass)}
+    formulas += author.formulas(right, force, named, ("force", None), explained=known)
+    yield Sentence(text)
+    yield from formulas
+
+
+def _prescribed(author: Author) -> Iterator[Piece]:
+    """What is left where no degree of freedom is: the forces of the constraints, those of drivers among them."""
+    opening = "The motion is prescribed: no acceleration is unknown."
+    named, system = author.equations.written("tree_system")
+    if not any(x != 0 for x in (*system.mass_matrix, *system.force)):
+        yield Sentence(f"{opening} Nothing has mass and no forces act, so that the constraints exert none.")
+        return
+    yield Sentence(
+        f"{opening} The constraints exert the forces $-\\mathbf{{C}}_q^T \\boldsymbol{{\\lambda}} = \\mathbf{{M}} "
+        "\\ddot{\\mathbf{q}} - \\mathbf{f}$. Of $\\boldsymbol{\\lambda}$, one component belongs to each constraint "
+        "equation; that of a driver, with the opposite sign, is the force or torque with which it drives its "
+        "coordinate."
+    )
+    yield from author.formulas(r"\mathbf{M}", system.mass_matrix, named, ("tree_system", None), True)
+    known = {symbol for symbol, _ in needed(named, system.mass_matrix)}
+    yield from author.formulas(r"\mathbf{f}", system.force, named, ("tree_system", None), explained=known)
 
 
 # -- numbers -----------------------------------------------------------------------------------------------------------
 
 
-LONG = 60  #: nodes of an expression up to which its numbers are put in
+LONG = 60  #: nodes of an expression up to which its numbers are substituted
 MOST = 400  #: lines of the calculation
 
 
-def calculation(author: Author, state: Mapping[str, float], reason: str, moved: bool = False) -> Section:
+@titled("Numbers: one state, line by line")
+def calculation(author: Author, state: Mapping[str, float], reason: str, moved: bool = False) -> Iterator[Piece]:
     """One state, and every formula that was shown with its numbers; without numbers the reason.
 
     ``moved`` tells that the independent velocities are 1 in place of the declared ones, which all are 0.
     """
-    title = "Numbers: one state, line by line"
     if not state:
-        return Section(title, (Sentence(f"No numbers: {reason}"),))
+        yield Sentence(f"No numbers: {reason}")
+        return
     eqs = author.equations
     k = eqs.kinematics
     names = [*k.names, *k.velocity_names, *k.state_names, *k.parameter_names, *k.input_names]
     rows = tuple(
         (f"${author.symbol(name)}$", f"{state[name]:.6g}")
         for name in names
-        if name in state and name not in author.put_in
+        if name in state and name not in author.substituted
     )
     numbers = dict(state)
-    pieces: list[Piece] = [
-        Sentence(
-            (
-                "The declared initial position and the declared parameters. The declared velocities are all 0, which "
-                "would hide most terms; here the independent velocities are 1. "
-                if moved
-                else "The declared initial state, with closed loops and consistent velocities, and the declared "
-                "parameters. "
-            )
-            + "Each line repeats the left side of a formula, then the formula with its numbers, then its value. A "
-            "value that is no more than the rounding of the numbers in it is written as 0."
-        ),
-        Table(("symbol", "value"), rows),
-    ]
+    text = "The declared initial state, with closed loops and consistent velocities, and the declared parameters. "
+    if moved:
+        text = "The declared initial position and the declared parameters. The declared velocities are all 0, which "
+        text += "would hide most terms; here the independent velocities are 1. "
+    yield Sentence(
+        f"{text}Each line repeats the left side of a formula, then the formula with its numbers, then its value. A "
+        "value that is no more than the rounding of the numbers in it is written as 0."
+    )
+    yield Table(("symbol", "value"), rows)
     lines: list[Piece] = []
     left_out = 0
     for part in author.printed:
@@ -511,11 +756,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
     lines += _accelerations(author, state)
     if left_out:
         lines.append(Sentence(f"{left_out} further lines are left out; the formulas are evaluated all the same below."))
-    if len(lines) > 120:
-        pieces.append(Folded(f"{len(lines)} lines of the calculation", tuple(lines)))
-    else:
-        pieces += lines
-    return Section(title, tuple(pieces))
+    yield from lines if len(lines) <= 120 else [Folded(f"{len(lines)} lines of the calculation", tuple(lines))]
 
 
 def _line(
@@ -535,25 +776,24 @@ def _line(
     return author.in_numbers(left, expression, here, value)
 
 
-def _accelerations(author: Author, state: Mapping[str, float]) -> list[Piece]:
+def _accelerations(author: Author, state: Mapping[str, float]) -> Iterator[Piece]:
     """The accelerations that the compiled module finds at the state."""
-    eqs = author.equations
-    names = [n for n in map(acceleration_name, eqs.kinematics.velocity_names) if n in state]
-    if not names:
-        return []
-    axes_text = Sentence("The equations of motion then give the accelerations")
-    return [axes_text, *(author.line(author.symbol(name), state[name]) for name in names)]
+    names = [n for n in map(acceleration_name, author.equations.kinematics.velocity_names) if n in state]
+    if names:
+        yield Sentence("The equations of motion then give the accelerations")
+    yield from (author.line(author.symbol(name), state[name]) for name in names)
 
 
-def counts(author: Author) -> Section:
+@titled("Operations")
+def counts(author: Author) -> Iterator[Piece]:
     """Operations of each part of the equations."""
     rows = tuple(
         (name, str(c.multiplications), str(c.additions), str(c.divisions), str(c.total))
         for name, c in author.source.operations.items()
     )
-    text = f"Operations of each part of the equations of the tree, derived by method `{author.equations.method}`."
-    head = ("part", "multiplications", "additions", "divisions", "together")
-    return Section("Operations", (Sentence(text), Table(head, rows)))
+    method = author.equations.method
+    yield Sentence(f"Operations of each part of the equations of the tree, derived by method `{method}`.")
+    yield Table(("part", "multiplications", "additions", "divisions", "together"), rows)
 
 
 def difference(result: Difference | None, reason: str) -> Section:

@@ -8,8 +8,8 @@ from typing import Any
 from ..errors import ModelError
 from ..model.description import Description
 from .robot import CONVERTED, RobotOptions, make_options
-from .robot_description import describe_robot
-from .urdf import read_urdf
+from .robot_description import RobotWriter
+from .urdf import UrdfReader
 from .xml_file import read_xml
 
 __all__ = ["RobotOptions", "describe_file"]
@@ -24,11 +24,11 @@ def describe_file(path: str | os.PathLike[str], **options: Any) -> Description:
     chosen = make_options(options)
     root = read_xml(path)
     if root.tag == "robot":
-        return describe_robot(read_urdf(root, chosen), chosen)
+        return RobotWriter(UrdfReader(root, chosen).read(), chosen).describe()
     if root.tag in ("mujoco", "mujocoinclude"):
         from .mjcf import read_mjcf
 
-        return describe_robot(read_mjcf(root, chosen), chosen)
+        return RobotWriter(read_mjcf(root, chosen), chosen).describe()
     remedy = "a URDF file begins with <robot>, an MJCF file with <mujoco>"
     if root.tag == "sdf":
         remedy += f"; {CONVERTED['.sdf']}"

@@ -243,13 +243,13 @@ def _refusal(answer: dict[str, Any], root: XmlElement, folder: str) -> Problem:
     """Why the process has no model."""
     code, smaller = answer.get("code", 0), "use fewer bodies, and meshes with fewer triangles"
     if "refused" in answer:
-        said = " ".join(answer["refused"].split()).replace("line 0", "of a file that it includes")
+        refusal = " ".join(answer["refused"].split()).replace("line 0", "of a file that it includes")
         remedy, kind = "", "EG-FILE-DAMAGED"
-        if re.search("opening file|empty file|is empty", said, re.I):  # what may not be opened is empty
+        if re.search("opening file|empty file|is empty", refusal, re.I):  # what may not be opened is empty
             remedy, kind = f"it must lie in {folder}; a folder that holds all files: assets=..., or --assets", "EG-FILE"
-        elif "already included" in said:
+        elif "already included" in refusal:
             remedy, kind = "include each file once", "EG-CIRCLE"
-        return _blame(said, root).problem("mujoco", f"MuJoCo refuses it: {said}", remedy, kind)
+        return _blame(refusal, root).problem("mujoco", f"MuJoCo refuses it: {refusal}", remedy, kind)
     if "memory" in answer:
         message = f"MuJoCo needs more memory for it than the {MEMORY / 1e9:g} GB it may have"
         return root.problem("mujoco", message, smaller, "EG-TOO-LARGE")
@@ -261,14 +261,14 @@ def _refusal(answer: dict[str, Any], root: XmlElement, folder: str) -> Problem:
     return root.problem("mujoco", f"MuJoCo {message}", remedy, "EG-FILE-DAMAGED")
 
 
-def _blame(said: str, root: XmlElement) -> XmlElement:
+def _blame(refusal: str, root: XmlElement) -> XmlElement:
     """The element that a message of MuJoCo is about, by its name or tag, line and file; the root if that is in doubt.
 
     MuJoCo tells the lines of the model's own file, and line 0 of what it includes.
     """
 
     def word(pattern: str) -> str:
-        return match[1] if (match := re.search(pattern, said, re.I)) else ""
+        return match[1] if (match := re.search(pattern, refusal, re.I)) else ""
 
     name, tag, file = word(r"Element name '([^']+)'"), word(r"Element '([^']+)'"), word(r"file '([^']+)'")
     line = int(word(r"line (\d+)") or 0)

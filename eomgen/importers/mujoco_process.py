@@ -18,7 +18,7 @@ import sys
 import warnings
 from typing import Any
 
-SHOWN, LONGEST = 20, 2000  #: warnings that are passed on; characters of a message
+MOST, LONGEST = 20, 2000  #: warnings that are passed on; characters of a message
 FIELDS = ("body", "jnt", "dof", "geom", "site", "eq", "tendon", "wrap", "actuator", "qpos", "qpos0")
 OPTIONS = ("gravity", "density", "viscosity", "disableflags", "enableflags", "disableactuator")
 NAMED = {"body": "nbody", "joint": "njnt", "equality": "neq", "tendon": "ntendon", "actuator": "nactuator"}
@@ -62,19 +62,19 @@ def main(order: dict[str, Any]) -> None:
     sys.path[:] = order["modules"]
     _bound({"CORE": 0, "FSIZE": 0, "CPU": order["seconds"], "AS": order["memory"]})
     answer: dict[str, Any] = {}
-    data, said = b"", dict[str, None]()  # warnings, in order
+    data, messages = b"", dict[str, None]()  # warnings, in order
     try:
         import mujoco
 
         if sys.platform == "linux":
             _confine(order["folder"])
-        mujoco.set_mju_user_warning(lambda text: said.setdefault(text[:LONGEST]))
-        warnings.showwarning = lambda message, *_, **__: said.setdefault(str(message)[:LONGEST])
+        mujoco.set_mju_user_warning(lambda text: messages.setdefault(text[:LONGEST]))
+        warnings.showwarning = lambda message, *_, **__: messages.setdefault(str(message)[:LONGEST])
         warnings.simplefilter("always")
         spec = mujoco.MjSpec.from_file(order["path"])
         _strip(spec, mujoco.MjSpec())
         data = _arrays(mujoco, spec.compile(), answer)
-        answer["warnings"] = list(said)[:SHOWN]
+        answer["warnings"] = list(messages)[:MOST]
     except ImportError as error:
         answer = {"missing": str(error)}
     except MemoryError:

@@ -215,11 +215,11 @@ def _roll_pitch_yaw(R: np.ndarray) -> list[float]:
     The yaw is read first and the roll from what it leaves, so that an uncertain yaw near pitch = +-pi/2 does no harm
     (the order of Eigen's Euler angles).
     """
-    across = math.hypot(R[0, 0], R[1, 0])
-    yaw = math.atan2(R[1, 0], R[0, 0]) if across > 0 else 0.0
+    horizontal = math.hypot(R[0, 0], R[1, 0])
+    yaw = math.atan2(R[1, 0], R[0, 0]) if horizontal > 0 else 0.0
     c, s = cosine_and_sine(yaw)
     roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return [roll, math.atan2(-R[2, 0], across), yaw]
+    return [roll, math.atan2(-R[2, 0], horizontal), yaw]
 
 
 IDENTITY = Placement(np.eye(3), np.zeros(3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -53,17 +53,6 @@ class RobotBody:
         return sum_inertias([link.inertia.seen(frame) for link, frame in self.members])
 
 
-class Load(NamedTuple):
-    """What a joint moves: its mass (kg), and how far from the joint its farthest centre of mass lies (m)."""
-
-    mass: float
-    reach: float
-
-    def size(self, joint_type: str) -> float:
-        """Mass along a slide (kg), mass times reach about an axis (kg m); 1 where there is none."""
-        return (self.mass if joint_type == "prismatic" else self.mass * self.reach) or 1.0
-
-
 @dataclass
 class Bodies:
     """The bodies of a robot in order from the root (ground first), and where each link is."""
@@ -81,20 +70,18 @@ class Bodies:
         """The body that carries a joint."""
         return self.home[joint.parent][0] if joint.parent else GROUND
 
-    def loads(self) -> dict[str, Load]:
-        """What the joint of each body moves, all that it carries included."""
-        result: dict[str, Load] = {}
+    def loads(self) -> dict[str, tuple[float, float]]:
+        """The mass (kg) on the joint of each body, and how far from it its farthest centre of mass lies (m)."""
+        result = dict.fromkeys(self.bodies, (0.0, 0.0))
         for body in reversed(self.bodies.values()):  # children come after their parents
-            inertia, before = body.inertia(), result.get(body.name, Load(0.0, 0.0))
-            arm = float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
-            mine = result[body.name] = Load(before.mass + inertia.mass, max(before.reach, arm))
-            if body.joint is None or not body.joint.parent:
-                continue
-            home, frame = self.home[body.joint.parent]
-            place = frame @ body.joint.outer
-            other = result.get(home, Load(0.0, 0.0))
-            reach = mine.reach + float(np.linalg.norm(place.position))
-            result[home] = Load(other.mass + mine.mass, max(other.reach, reach))
+            inertia, (mass, reach) = body.inertia(), result[body.name]
+            mass, arm = mass + inertia.mass, float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
+            reach = max(reach, arm)
+            result[body.name] = mass, reach
+            if body.joint is not None and body.joint.parent:
+                home, frame = self.home[body.joint.parent]
+                distance = float(np.linalg.norm((frame @ body.joint.outer).position))
+                result[home] = result[home][0] + mass, max(result[home][1], reach + distance)
         return result
 
     def tied(self, robot: Robot) -> set[str]:
@@ -322,17 +309,12 @@ def _check_masses(robot: Robot, result: Bodies, check: str) -> None:
         robot.problem(f"joint.{joint.name}", message, remedy, joint.place, "EG-NO-INERTIA")
 
 
-SHOWN = 8  #: joints that a note names
+LISTED = 8  #: joints that a note names
 #: Stops of joints: part of the range that one gives way under the drive's effort; what is left of the speed after it.
 GIVE, REBOUND = 0.01, 0.3
 GRAVITY = 9.81  #: m/s^2, of the weight that stands for an effort that is not told
 _PARAMETERS = ("_e0", "_e1", "_e2", "_e3")
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
-
-
-def describe_robot(robot: Robot, options: RobotOptions) -> Description:
-    """The raw data of a robot; raises ModelError if it has faults."""
-    return _Writer(robot, options, build_bodies(robot, options)).describe()
 
 
 class _Names:
@@ -371,11 +353,12 @@ class _Names:
         return result
 
 
-class _Writer:
-    """Fills one Description."""
+class RobotWriter:
+    """Fills the Description of a robot; raises ModelError if it has faults."""
 
-    def __init__(self, robot: Robot, options: RobotOptions, result: Bodies) -> None:
-        self.robot, self.options, self.found = robot, options, result
+    def __init__(self, robot: Robot, options: RobotOptions) -> None:
+        result = build_bodies(robot, options)
+        self.robot, self.options, self.tree = robot, options, result
         gravity = robot.gravity if options.gravity is None else options.gravity
         name = clean_name(robot.name, "robot")[:LONGEST]
         name = f"{name[: LONGEST - 6]}_model" if fault_of_model_name(name) else name
@@ -394,12 +377,12 @@ class _Writer:
         self.loads = result.loads()
 
     def describe(self) -> Description:
-        moving = self.found.moving
+        moving = self.tree.moving
         self._bound(sum(len(self._suffixes(joint.type)) for _, joint in moving))
         for _, joint in moving:
             suffixes = [*self._suffixes(joint.type), *self._rates(joint.type)]
             self.joints[joint.name] = self.names.joint(joint.name, suffixes)
-        for body in self.found.bodies.values():
+        for body in self.tree.bodies.values():
             self._body(body)
         for body, joint in moving:
             self._joint(body, joint)
@@ -486,7 +469,7 @@ class _Writer:
 
     def _joint(self, body: RobotBody, joint: RobotJoint) -> None:
         name = self.joints[joint.name]
-        home, frame = self.found.home[joint.parent] if joint.parent else (GROUND, IDENTITY)
+        home, frame = self.tree.home[joint.parent] if joint.parent else (GROUND, IDENTITY)
         parent, child = self.bodies[home], self.bodies[body.name]
         between = [(frame @ joint.outer).reference(parent), joint.inner.reference(child)]
         names = [name + suffix for suffix in self._suffixes(joint.type)]
@@ -546,7 +529,8 @@ class _Writer:
         span = span if math.isfinite(span) else 1.0
         effort, speed = limits.get("effort", 0.0), limits.get("velocity", 0.0)
         if not 0.0 < effort < math.inf:
-            effort = GRAVITY * self.loads[body.name].size(joint.type)
+            mass, reach = self.loads[body.name]
+            effort = GRAVITY * ((mass if joint.type == "prismatic" else mass * reach) or 1.0)
         law = {
             "stiffness": effort / (GIVE * span) ** 1.5,
             "restitution": REBOUND,
@@ -602,12 +586,12 @@ class _Writer:
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:
         for loop in self.robot.loops:
-            if not self.found.around(loop):
+            if not self.tree.around(loop):
                 self.out.notes.append(f"left out: {loop.name}, because no joint moves its two links against each other")
                 continue
             pair = []
             for link, frame in (loop.first, loop.second):
-                body, at = self.found.home[link]
+                body, at = self.tree.home[link]
                 pair.append((at @ frame).reference(self.bodies[body]))
             kind = JOINTS[loop.type].kind
             name = self.names.joint(loop.name, [c.suffix for c in kind.coordinates])
@@ -670,15 +654,15 @@ class _Writer:
 
     def _note_data(self) -> None:
         """Say of which joints limits and dry friction are data that do not act."""
-        moving = [joint for _, joint in self.found.moving]
+        moving = [joint for _, joint in self.tree.moving]
         limited = [self.joints[j.name] for j in moving if any(k != "effort" or j.clamp is None for k in j.limits)]
         if limited and self.options.limits == "note":
             remedy = "a run that passes a limit warns; limits='stop' adds elastic stops, limits='off' does not warn"
-            self.out.notes.append(f"joint limits are not enforced ({listing(limited, SHOWN)}); {remedy}")
+            self.out.notes.append(f"joint limits are not enforced ({listing(limited, LISTED)}); {remedy}")
         rubbing = [self.joints[j.name] for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
             remedy = "load with friction=0.01 to let it act"
-            self.out.notes.append(f"the dry friction of joints does not act ({listing(rubbing, SHOWN)}); {remedy}")
+            self.out.notes.append(f"the dry friction of joints does not act ({listing(rubbing, LISTED)}); {remedy}")
 
 
 def _cut(law: str, bounds: Range) -> str:

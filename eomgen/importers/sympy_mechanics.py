@@ -33,8 +33,6 @@ from ..model.sympy_face import (
 )
 from ..model.values import give_latex
 
-KNOWN = "KanesMethod, LagrangesMethod, System, JointsMethod"
-
 
 @dataclass
 class Forms:
@@ -69,7 +67,8 @@ def read_forms(method: Any) -> Forms:
         return _read_kane(method)
     if isinstance(method, LagrangesMethod):
         return _read_lagrange(method)
-    raise ill_typed(f"from_sympy takes SymPy's {KNOWN} with its equations formed, not {type(method).__name__}")
+    known = "KanesMethod, LagrangesMethod, System, JointsMethod"
+    raise ill_typed(f"from_sympy takes SymPy's {known} with its equations formed, not {type(method).__name__}")
 
 
 def _read_lagrange(method: Any) -> Forms:
@@ -120,9 +119,13 @@ def _read_kane(method: Any) -> Forms:
     bodies = list(method.bodies)
     kinetic = sum((body.kinetic_energy(method._inertial) for body in bodies), S.Zero)
     potential = sum((body.potential_energy for body in bodies), S.Zero)
-    order = _paired(method._qdot, v, rates)
+    order = [v.index(rate) for rate in (rates[x] for x in method._qdot) if rate in v]  # of q, where all v are rates
+    order = order if sorted(order) == list(range(len(v))) else list(range(len(v)))
     kinetic = kinetic.xreplace(rates).xreplace(auxiliary).xreplace(named)
     rates = {dq: rate.xreplace(auxiliary).xreplace(named) for dq, rate in rates.items()}
+    motion = []
+    if len(method._udep):  # SymPy keeps them after it has put its own q' in, as matrices
+        motion = [row.xreplace(auxiliary) for row in method._k_nh * method.u + method._f_nh]
     matrix, forcing = (x.xreplace(auxiliary).xreplace(named) for x in (whole.mass_matrix, whole.forcing))
     return Forms(
         q=q,
@@ -131,7 +134,7 @@ def _read_kane(method: Any) -> Forms:
         mass_matrix=[[matrix[i, j] for j in order] for i in order],
         forcing=[forcing[k] for k in order],
         configuration=list(method._f_h),
-        motion=_constraints_of_speeds(method, auxiliary),
+        motion=motion,
         kinetic=kinetic,
         potential=potential,
         noncontributing=list(method.auxiliary_eqs.xreplace(auxiliary)) if len(method._uaux) else [],
@@ -179,13 +182,6 @@ def _of_all_speeds(method: Any) -> tuple[Any, dict[Any, Any]]:
     return whole, parts
 
 
-def _constraints_of_speeds(method: Any, auxiliary: dict[Any, Any]) -> list[Any]:
-    """SymPy keeps them after it has put its own q' in, as matrices."""
-    if not len(method._udep):
-        return []
-    return [row.xreplace(auxiliary) for row in method._k_nh * method.u + method._f_nh]
-
-
 def _solve_blocks(left: Any, right: Any) -> Any:
     """left^-1 right, block by block, by Cramer's rule: singular where left is, unlike elimination in a fixed order."""
     from sympy import zeros
@@ -198,12 +194,6 @@ def _solve_blocks(left: Any, right: Any) -> Any:
         for i, k in enumerate(block):
             result[k, :] = solved[i, :]
     return result
-
-
-def _paired(q_dot: Sequence[Any], v: Sequence[Any], rates: dict[Any, Any]) -> list[int]:
-    """Places of the speeds in the order of the coordinates whose rates they are; their own unless all are rates."""
-    first = [v.index(rate) for rate in (rates[x] for x in q_dot) if rate in v]
-    return first if sorted(first) == list(range(len(v))) else list(range(len(v)))
 
 
 # -- noncontributing forces --------------------------------------------------------------------------------------------
@@ -327,7 +317,11 @@ def describe_method(
         forms.potential = potential_energy
     extra = named("outputs", outputs)
     if specified is not None and named("specified", specified):
-        _specify(forms, extra, specified)
+        for key in specified:
+            if not is_sympy(key) or function_name(key) is None:
+                raise ill_typed(f"specified takes functions of time f(t), not {key!r}")
+        vars(forms).update(replaced(vars(forms), specified))
+        extra = replaced(extra, specified)
     known = _Names(forms)
     given_parameters = named("parameters", parameters)
     given_inputs = dict.fromkeys(names_of("inputs", inputs, "an input"), 0.0) if listed else named("inputs", inputs)
@@ -440,23 +434,11 @@ class _Names:
         driven = [name for name in symbols if name in inputs]
         for name in inputs:
             if name not in functions and name not in symbols:
-                near, message = (
-                    nearest(str(name), [*functions, *symbols], "known"),
-                    f"the equations do not contain {name!r}",
-                )
+                near = nearest(str(name), [*functions, *symbols], "known")
+                message = f"the equations do not contain {name!r}"
                 self.problems.append(Problem(f"inputs.{name}", message, near, code="EG-NAME-UNKNOWN"))
         constants = [name for name in symbols if name not in self.names and name not in driven]
         return sorted(set(constants) - functions), sorted({*functions, *driven})
-
-
-def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]) -> None:
-    """Replace functions of time by expressions, their derivatives by those of the expressions."""
-    for key in specified:
-        if not is_sympy(key) or function_name(key) is None:
-            raise ill_typed(f"specified takes functions of time f(t), not {key!r}")
-
-    vars(forms).update(replaced(vars(forms), specified))
-    outputs.update(replaced(outputs, specified))
 
 
 def _independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str]) -> tuple[list[int], bool]:

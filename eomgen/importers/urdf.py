@@ -133,13 +133,8 @@ def _color(material: XmlElement) -> str:
     return "#" + "".join(f"{round(255.0 * min(max(float(part), 0.0), 1.0)):02x}" for part in parts)
 
 
-def read_urdf(root: XmlElement, options: RobotOptions) -> Robot:
-    """The robot of a URDF file; its faults are in ``problems``."""
-    return _UrdfReader(root, options).read()
-
-
-class _UrdfReader:
-    """Reads elements into a Robot, noting faults as it goes."""
+class UrdfReader:
+    """Reads elements of a URDF file into a Robot, whose ``problems`` are its faults."""
 
     def __init__(self, root: XmlElement, options: RobotOptions) -> None:
         self.root, self.options = root, options

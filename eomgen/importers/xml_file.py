@@ -112,7 +112,7 @@ HARMLESS = "no part of the motion"  #: looks, solvers, sensors: left out in sile
 
 ANY = "*"  #: any attribute
 INSIDE = "**"  #: any attribute and all that is inside
-SHOWN = 6  #: constructs that one note names
+LISTED = 6  #: constructs that one note names
 
 
 class ConstructRow(NamedTuple):
@@ -178,4 +178,4 @@ class Constructs:
                 continue  # all is well, or the note of the element says it
             construct = f"<{tag}{' ' * bool(attribute)}{attribute}>" + (f" {count} times" * (count > 1))
             left.setdefault("what this reader does not know" if row is None else row.why, []).append(construct)
-        return [f"left out: {why} ({listing(names, SHOWN)})" for why, names in left.items()]
+        return [f"left out: {why} ({listing(names, LISTED)})" for why, names in left.items()]

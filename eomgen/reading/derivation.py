@@ -97,7 +97,7 @@ class Derivation(Record, Displayed):
     __repr__ = Displayed.__repr__
 
     @cached_property
-    def _shown_text(self) -> str:
+    def _text(self) -> str:
         from .writers import equations_text
 
         lines = [equations_text(self), ""]

@@ -1,4 +1,4 @@
-"""Equations -> what notebooks and terminals show of them, and views with values put in."""
+"""Equations -> what notebooks and terminals show of them, and views with values substituted."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import UnavailableError, at_odds
 from ..runtime.argument_checks import find_lacking
+from .quantities import Formed, Written
 from .readable import Derived, Readable, dynamic_symbols
 
 
 class Displayed(Readable):
-    """Equations that show themselves, and that give the same quantities with values put in or in functions of time."""
+    """Equations that show themselves, and give the same quantities with values substituted or in functions of time."""
 
     # -- display ------------------------------------------------------------------------------------------------------
-    def __str__(self) -> str:
-        return self._shown_text
-
     def __repr__(self) -> str:
-        return self._shown_text
+        return self._text
 
     def _repr_html_(self) -> str:
         from .writers import facts_html
@@ -32,7 +30,7 @@ class Displayed(Readable):
         return equations_latex(self)
 
     @cached_property
-    def _shown_text(self) -> str:
+    def _text(self) -> str:
         from .writers import equations_text
 
         return equations_text(self)
@@ -45,7 +43,20 @@ class Displayed(Readable):
 
     def again(self) -> ReadingView:
         """The same quantities, none of them made yet."""
-        return ReadingView(self, self._symbol, self._put_in)
+        return ReadingView(self, self._symbol, self._substituted)
+
+    def as_formed(self, name: str, part: str | None = None) -> tuple[Written, Formed]:
+        """A quantity as it was written and, to compare with, as it was formed.
+
+        Parts that were written together, such as those of generalized forces, are in the whole.
+        """
+        value, key = getattr(self, name), f"{name}.{part}"
+        if isinstance(value, Mapping) and part is not None:
+            value[part]
+        if key not in self._forms and name not in self._forms:  # made before this went through pickle
+            return self.again().as_formed(name, part)
+        key = key if key in self._forms else name
+        return self._written[key], self._forms[key]()
 
     # -- the same with other symbols or values ------------------------------------------------------------------------
     def with_dynamicsymbols(self) -> ReadingView:
@@ -58,10 +69,10 @@ class Displayed(Readable):
         -------
         ReadingView
         """
-        return ReadingView(self, dynamic_symbols(self.kinematics), self._put_in)
+        return ReadingView(self, dynamic_symbols(self.kinematics), self._substituted)
 
     def subs(self, values: Mapping[Any, Any]) -> ReadingView:
-        """The same quantities with values put in, all at once, after derivatives have been taken.
+        """The same quantities with values substituted, all at once, after derivatives have been taken.
 
         Parameters
         ----------
@@ -78,10 +89,10 @@ class Displayed(Readable):
         UsageError
             An unknown name, or a value that is no expression.
         """
-        return ReadingView(self, self._symbol, (*self._put_in, self._read(values)))
+        return ReadingView(self, self._symbol, (*self._substituted, self._read(values)))
 
     def with_parameters(self, values: Mapping[Any, Any] | None = None, /, **named: Any) -> ReadingView:
-        """The same quantities with values of parameters put in: ``with_parameters(l=0.5)``; see :meth:`subs`.
+        """The same quantities with values substituted for parameters: ``with_parameters(l=0.5)``; see :meth:`subs`.
 
         Parameters
         ----------
@@ -103,11 +114,11 @@ class Displayed(Readable):
         more = self._read(named, "parameter")
         if both := sorted({*read} & {*more}):
             raise at_odds(f"parameter {both[0]!r} is given twice; give it one value")
-        return ReadingView(self, self._symbol, (*self._put_in, read | more))
+        return ReadingView(self, self._symbol, (*self._substituted, read | more))
 
 
 class ReadingView(Displayed):
-    """Equations to read, with values put in or with functions of time; all quantities of :class:`Readable`.
+    """Equations to read, with values substituted or with functions of time; all quantities of :class:`Readable`.
 
     Made by ``subs``, ``with_parameters`` and ``with_dynamicsymbols`` of equations and of other views.
 
@@ -131,7 +142,7 @@ class ReadingView(Displayed):
     def __init__(self, source: Displayed, symbols: Callable[[str], Any], values: tuple[Mapping[str, Any], ...]) -> None:
         self.source: Displayed = source.source if isinstance(source, ReadingView) else source
         self.kinematics, self.mobility = source.kinematics, source.mobility
-        self._symbol, self._put_in = symbols, tuple(mapping for mapping in values if mapping)
+        self._symbol, self._substituted = symbols, tuple(mapping for mapping in values if mapping)
 
     def fresh(self) -> Derived:
         return self.source.fresh()
@@ -141,21 +152,21 @@ class ReadingView(Displayed):
         return self.source.method
 
     def explain(self, level: str = "full") -> Any:
-        """The worked solution with the values of parameters and inputs that were put in; see ``explain`` of equations.
+        """The worked solution with the substituted values of parameters and inputs; see ``explain`` of equations.
 
         The formulas are compared with the compiled module at these values.
 
         Raises
         ------
         UnavailableError
-            A value was put in for a coordinate, a velocity, an acceleration or the time: the steps of a solution
+            A value was substituted for a coordinate, a velocity, an acceleration or the time: the steps of a solution
             differentiate by them.  Or a value holds a name that is no parameter or input of the model.
         """
-        if not self._put_in:
+        if not self._substituted:
             return self.source.explain(level)  # type: ignore[attr-defined]
         k = self.kinematics
         known = {*k.parameter_names, *k.input_names}
-        moving = sorted({name for mapping in self._put_in for name in mapping}.difference(known))
+        moving = sorted({name for mapping in self._substituted for name in mapping}.difference(known))
         strange = sorted({*self.names_substituted}.difference(known))
         if moving:
             raise UnavailableError(
@@ -172,4 +183,4 @@ class ReadingView(Displayed):
 
     def in_plain_symbols(self) -> Readable:
         plain = self.source._symbol
-        return self if self._symbol is plain else ReadingView(self.source, plain, self._put_in)
+        return self if self._symbol is plain else ReadingView(self.source, plain, self._substituted)

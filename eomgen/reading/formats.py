@@ -23,14 +23,12 @@ from .readable import Readable
 from .writers import COLUMNS, equations_text, latex_formulas
 
 _MATLAB_KEYWORDS = (
-    "break case catch classdef continue else elseif end for function global if otherwise parfor persistent "
+    "break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd "
+    "switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"
 )
-_MATLAB_KEYWORDS += "return spmd switch try while pi i j Inf NaN eps ans M f sin cos tan exp log sqrt abs sign min max"
 _JULIA_KEYWORDS = (
-    "baremodule begin break catch const continue do else elseif end export false finally for function global "
-)
-_JULIA_KEYWORDS += (
-    "if import let local macro module quote return struct true try using while pi im M f sin cos tan exp log"
+    "baremodule begin break catch const continue do else elseif end export false finally for function global if import "
+    "let local macro module quote return struct true try using while pi im M f sin cos tan exp log"
 )
 
 
@@ -125,28 +123,28 @@ class _Code:
         body = {"sympy": self._sympy, "julia": self._julia, "c": self._c}.get(self.form, self._matlab)
         return "\n".join([*(f"{self.language.comment} {note}" for note in notes), *body(), ""])
 
-    def _lines(self, one: Callable[[str, str], str]) -> list[str]:
-        return [one(str(symbol), self.language.print(x)) for symbol, x in self.named]
+    def _statements(self, named: str, whole: str, brackets: str, states: str) -> list[str]:
+        """Definitions of named parts, of M, of f and of the rates of states."""
+
+        def write(x: Any) -> str:  # one by one: in a list, printers write numbers otherwise
+            return brackets.format(", ".join(map(write, x))) if isinstance(x, list) else self.language.print(x)
+
+        lists = {"M": self.mass.tolist(), "f": [*self.force]} | ({states: self.states} if self.states else {})
+        lines = [named.format(symbol, write(x)) for symbol, x in self.named]
+        return lines + [whole.format(name, write(entries)) for name, entries in lists.items()]
 
     def _sympy(self) -> list[str]:
-        """Statements that define the symbols, M and f."""
-        names = ", ".join(self.arguments)
-        return [
-            "import sympy",
-            "from sympy import *",
-            *([f"{names}, = symbols({' '.join(self.arguments)!r}, seq=True)"] if names else []),
-            *self._lines(lambda name, x: f"{name} = {x}"),
-            f"M = sympy.Matrix({[[*row] for row in self.mass.tolist()]})",
-            f"f = sympy.Matrix({list(self.force)})",
-            *([f"state_rates = sympy.Matrix({self.states})"] if self.states else []),
-        ]
+        """Statements that define the symbols too."""
+        lines, names = ["import sympy", "from sympy import *"], ", ".join(self.arguments)
+        lines += [f"{names}, = symbols({' '.join(self.arguments)!r}, seq=True)"] if names else []
+        return lines + self._statements("{} = {}", "{} = sympy.Matrix({})", "[{}]", "state_rates")
 
     def _body(
         self, line: str, place: Callable[[tuple[int, ...]], str], start: int, zeros: str = "", named: str = ""
     ) -> Iterator[str]:
         """Lines of named parts, then of the entries of M, f and the rates of states; ``zeros`` makes these arrays."""
         n, write = self.mass.rows, self.language.print
-        yield from self._lines((named or line).format)
+        yield from ((named or line).format(symbol, write(x)) for symbol, x in self.named)
         for name, entries, sizes in (
             ("M", {(i, j): self.mass[i, j] for i in range(n) for j in range(n)}, (n, n)),
             ("f", {(i,): x for i, x in enumerate(self.force)}, (n,)),
@@ -176,13 +174,7 @@ class _Code:
         return ["#include <math.h>", head, "{", *body, "}"]
 
     def _mathematica(self) -> list[str]:
-        rows = (", ".join(self.language.print(x) for x in row) for row in self.mass.tolist())
-        return [
-            *self._lines(lambda name, x: f"{name} = {x};"),
-            f"M = {{{', '.join(f'{{{row}}}' for row in rows)}}};",
-            f"f = {{{', '.join(map(self.language.print, self.force))}}};",
-            *([f"stateRates = {{{', '.join(map(self.language.print, self.states))}}};"] if self.states else []),
-        ]
+        return self._statements("{} = {};", "{} = {};", "{{{}}}", "stateRates")
 
 
 def _renamed(names: Iterable[str], reserved: frozenset[str], form: str) -> dict[str, str]:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import IntEnum
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any
 
 import sympy
 
 from ..runtime.argument_checks import unknown
 
 # -- named parts -------------------------------------------------------------------------------------------------------
-
-
-Value = TypeVar("Value")
 
 
 class NamedSum(sympy.Matrix):  # type: ignore[misc]  # SymPy has no types
@@ -42,34 +39,6 @@ class NamedSum(sympy.Matrix):  # type: ignore[misc]  # SymPy has no types
         if name not in self.parts:
             raise unknown("force element", name, self.parts)
         return self.parts[name]
-
-
-class ByName(Mapping[str, Value], Generic[Value]):
-    """Quantities by name, each made when first used; ``plain`` gives ``left_rod`` of ``left.rod``."""
-
-    def __init__(
-        self, what: str, names: Sequence[str], make: Callable[[str], Value], plain: Callable[[str], str]
-    ) -> None:
-        self._what, self._names, self._make, self._plain = what, tuple(names), make, plain
-        self._made: dict[str, Value] = {}
-
-    def __getitem__(self, name: str) -> Value:
-        if name not in self._names and isinstance(name, str):
-            name = self._plain(name)
-        if name not in self._names:
-            raise unknown(self._what, name, self._names)
-        if name not in self._made:
-            self._made[name] = self._make(name)
-        return self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return f"<by {self._what}: {', '.join(self._names)}>"
 
 
 # -- groups ------------------------------------------------------------------------------------------------------------
@@ -175,24 +144,16 @@ def _meaning(x: Any, level: int, uses: set[PartMeaning]) -> PartMeaning:
 
 MOST = 10  #: blocks in a row that are shown
 
-Places = tuple[int, ...]
-
-
-class MatrixBlocks(NamedTuple):
-    """Groups of coordinates, and groups of constraint equations."""
-
-    coordinates: tuple[Places, ...]
-    equations: tuple[Places, ...]
-
 
 def find_blocks(
     inertia: Sequence[Sequence[bool]],
     constraints: Sequence[Sequence[bool]],
     labels: Sequence[str],
     branches: Sequence[int],
-) -> MatrixBlocks | None:
-    """Groups, None where there is one group of coordinates or where there are too many groups.
+) -> tuple[list[list[int]], list[list[bool]]] | None:
+    """Groups of coordinates, and which blocks of the Jacobian do not vanish, by joints and groups.
 
+    None where there is one group of coordinates, where there are too many groups, and where no block vanishes.
     ``inertia`` and ``constraints`` tell where mass matrix (n, n) and Jacobian (m, n) do not vanish, whose rows have
     labels, the joint before the first dot.  Coordinates of one branch of the tree, counted at ground, stay together.
     """
@@ -203,10 +164,11 @@ def find_blocks(
             if inertia[i][j] and group[i] != group[j]:
                 old, new = max(group[i], group[j]), min(group[i], group[j])
                 group = [new if k == old else k for k in group]
-    coordinates = tuple(tuple(j for j in range(n) if group[j] == k) for k in dict.fromkeys(group))
-    joints = [label.partition(".")[0] for label in labels]
-    equations = tuple(tuple(i for i, x in enumerate(joints) if x == joint) for joint in dict.fromkeys(joints))
-    if not 1 < len(coordinates) <= MOST or not 1 < len(equations) <= MOST or len(coordinates) == n:
+    groups = [[j for j in range(n) if group[j] == k] for k in dict.fromkeys(group)]
+    rows: dict[str, list[Sequence[bool]]] = {}
+    for label, row in zip(labels, constraints, strict=True):
+        rows.setdefault(label.partition(".")[0], []).append(row)
+    if not 1 < len(groups) <= MOST or not 1 < len(rows) <= MOST or len(groups) == n:
         return None
-    count = sum(any(constraints[i][j] for i in rows for j in columns) for rows in equations for columns in coordinates)
-    return MatrixBlocks(coordinates, equations) if count < len(equations) * len(coordinates) else None
+    filled = [[any(row[j] for row in of_joint for j in places) for places in groups] for of_joint in rows.values()]
+    return None if all(map(all, filled)) else (groups, filled)

@@ -17,8 +17,8 @@ from ..expr.differentiate import jacobian, jvp
 from ..expr.evaluate import evaluate
 from ..expr.tensors import dot, solve_symmetric
 from ..mechanics.methods.reduction import solve_velocities
-from .methods import put_in
-from .quantities import Quantities, Row, Rows
+from .quantities import Formed, Quantities, Row, Rows
+from .symbols import substitute_values
 
 # -- states without a linearization ------------------------------------------------------------------------------------
 
@@ -80,9 +80,7 @@ def _samples(quantities: Quantities, expressions: Sequence[Expr]) -> Iterator[An
     """The expressions at a few values of their symbols; none where they hold functions that are not known here."""
     if quantities.graph.functions:
         return
-    kinematics, left = quantities.kinematics, sorted(symbols_of(expressions))
-    places = zip(kinematics.names, quantities.mobility.q_reference, strict=True)
-    declared = quantities.numbers | {name: x + 0.3 + 0.1 * k for k, (name, x) in enumerate(places)}
+    left, declared = sorted(symbols_of(expressions)), quantities.numbers_elsewhere
     for first in (0.7, 0.4, 1.3):
         made_up = {name: first + 0.17 * k for k, name in enumerate(left)}
         with np.errstate(all="ignore"):
@@ -106,7 +104,7 @@ class SymbolicLinearization(NamedTuple):
     Attributes
     ----------
     A, B : sympy.Matrix
-        (n, n), (n, n_u); rows of expressions before they are written.
+        (n, n), (n, n_u).
     states, inputs : tuple of str
         What the entries of x and u are called, as in ``Module.linearize``.
     intermediates : list of (sympy.Symbol, sympy.Expr)
@@ -120,8 +118,8 @@ class SymbolicLinearization(NamedTuple):
     intermediates: Sequence[tuple[Any, Any]] = ()
 
 
-def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> SymbolicLinearization:
-    """A and B at a state; velocities that ``at`` does not name are 0.
+def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) -> Formed:
+    """The entries of A, then of B, at a state, and names of the states; velocities that ``at`` does not name are 0.
 
     ``equilibrium`` tells that the accelerations vanish there.
     """
@@ -144,26 +142,22 @@ def linearize(quantities: Quantities, at: Mapping[str, Any], equilibrium: bool) 
     changes = [jvp(residual, move.along(kinematics.v)) for move in moves]
     slopes = jacobian(residual, [graph.symbol(name) for name in inputs])
     changes += [[slopes.get((i, k), graph.zero) for i in range(len(free))] for k in range(len(inputs))]
-    flat = put_in([x for row in quantities.mass_matrix for x in row], at)
+    flat = substitute_values([x for row in quantities.mass_matrix for x in row], at)
     mass = [flat[k * len(free) : (k + 1) * len(free)] for k in range(len(free))]
     require_inverse(quantities, mass, named)
-    rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, put_in(quantities.force, at))
+    rates = [graph.zero] * len(free) if equilibrium else solve_symmetric(mass, substitute_values(quantities.force, at))
     still = dict(zip(a, rates, strict=True))
-    columns = [solve_symmetric(mass, substitute(put_in(change, at), still)) for change in changes]
+    columns = [solve_symmetric(mass, substitute(substitute_values(change, at), still)) for change in changes]
     lower = list(zip(*columns, strict=True)) if columns else []
     shifts = [_shift(quantities, move, column) for move, column in zip(moves, [*zip(*Z, strict=True)], strict=False)]
     shifts += [move.velocities for move in moves[len(shifts) :]]
-    upper = [tuple(put_in([shift[k] for shift in shifts], at)) for k in positions]
+    upper = [tuple(substitute_values([shift[k] for shift in shifts], at)) for k in positions]
     n = len(moves)
     A: Rows = (*upper, *(row[:n] for row in lower))
     B: Rows = (*((graph.zero,) * len(inputs) for _ in upper), *(row[n:] for row in lower))
     require_finite(quantities, {"A": A, "B": B}, named)
-    return SymbolicLinearization(
-        A,
-        B,
-        (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free)),
-        inputs,
-    )
+    states = (*(_displacement_name(quantities, k) for k in positions), *(kinematics.velocity_names[k] for k in free))
+    return Formed([x for matrix in (A, B) for row in matrix for x in row], extra=states)
 
 
 FACTORED = 120  #: operations of an entry up to which it is factored

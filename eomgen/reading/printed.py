@@ -47,15 +47,6 @@ from .tree_system import MANY
 UNITS = {"angle": "rad", "turn": "rad", "length": "m", "parameter": ""}
 
 
-class PrintedCoordinate(NamedTuple):
-    """A row of the table of coordinates."""
-
-    name: str
-    joint: str
-    unit: str
-    role: str
-
-
 class Letters(NamedTuple):
     """LaTeX of the letters of M v' = f."""
 
@@ -176,17 +167,6 @@ class PrintedEquations:
         """v' of M v' = f."""
         return [self.formula(x) for x in self.equations.symbols_substituted(self.equations.acceleration_names)]
 
-    @cached_property
-    def states(self) -> list[tuple[Formula, Formula]]:
-        """First-order states: their rates, and what these are, after named parts of the latter; no sampled ones."""
-        names, sampled = self.equations.kinematics.state_names, self.equations.kinematics.mechanism.sampled_names
-        return self._pairs("state_rates", [None if n in sampled else acceleration_name(n) for n in names])
-
-    @cached_property
-    def sampled(self) -> list[tuple[Formula, Formula]]:
-        """Sampled states and what they become, behind the time of the next sample, after named parts of these."""
-        return self._pairs("sampled_values", [name for name, _ in self.equations.kinematics.sampled])
-
     def _pairs(self, quantity: str, names: Sequence[str | None]) -> list[tuple[Formula, Formula]]:
         """Named parts of a column, then its entries that have names, each with what it is."""
         if not (kept := [name for name in names if name is not None]):
@@ -196,15 +176,18 @@ class PrintedEquations:
         pairs = (*named, *zip(self.equations.symbols_substituted(kept), entries, strict=True))
         return [(self.formula(left), self.formula(right)) for left, right in pairs]
 
-    @property
+    @cached_property
     def titled_states(self) -> list[tuple[str, list[tuple[Formula, Formula]]]]:
-        """First-order states, then sampled ones, under their titles, where there are any."""
-        titled = (("first-order states", self.states), (SAMPLED, self.sampled))
-        return [(title, pairs) for title, pairs in titled if pairs]
+        """Rates of first-order states, then what sampled ones become, each after its named parts, under titles."""
+        k = self.equations.kinematics
+        rates = [None if n in k.mechanism.sampled_names else acceleration_name(n) for n in k.state_names]
+        titled = {"first-order states": self._pairs("state_rates", rates)}
+        titled[SAMPLED] = self._pairs("sampled_values", [name for name, _ in k.sampled])
+        return [(title, pairs) for title, pairs in titled.items() if pairs]
 
     @property
     def values(self) -> list[Formula]:
-        """Equations of what was put in, ``l = 0.5``; a second time for a name with what came later."""
+        """Equations of what was substituted, ``l = 0.5``; a second time for a name with what came later."""
         return [
             Relation("=", (Name(name), number(float(x), 15) if isinstance(x, float | int) else self.formula(x)))
             for values in self.equations.values_substituted()
@@ -213,7 +196,7 @@ class PrintedEquations:
 
     @property
     def is_one_equation(self) -> bool:
-        """Whether there is one acceleration, for which nothing was put in."""
+        """Whether there is one acceleration, for which nothing was substituted."""
         return len(self.accelerations) == 1 and isinstance(self.accelerations[0], Name)
 
     @property
@@ -323,18 +306,13 @@ class PrintedEquations:
         return width(Matrix(tuple(map(tuple, rows))), self.names)
 
     @property
-    def coordinates(self) -> list[PrintedCoordinate]:
-        """Coordinates of the spanning tree."""
+    def coordinates(self) -> list[tuple[str, str, str, str]]:
+        """Coordinates of the spanning tree: name, joint, unit, and whether it is dependent."""
         k = self.equations.kinematics
         joints = {name: joint.name for joint in k.mechanism.joints for name in joint.coordinates}
         units = {} if k.mechanism.bare else dict(zip(k.names, (UNITS[kind] for kind in k.kinds), strict=True))
         independent = {*self.equations.independent}
-        return [
-            PrintedCoordinate(
-                name, joints.get(name, ""), units.get(name, ""), "" if name in independent else "dependent"
-            )
-            for name in k.names
-        ]
+        return [(n, joints.get(n, ""), units.get(n, ""), "" if n in independent else "dependent") for n in k.names]
 
     @property
     def title(self) -> str:
@@ -488,11 +466,12 @@ class PrintedParts:
         C, M = of.get(PartMeaning.CONSTRAINT), of[PartMeaning.INERTIA]
         if C is None or not M.is_large:
             return
-        inertia, held = ([[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C))
-        if (blocks := find_blocks(inertia, held, self.equations.constraint_names, self._branches)) is None:
+        inertia, nonzero = ([[x != ZERO for x in row] for row in matrix.entries] for matrix in (M, C))
+        if (blocks := find_blocks(inertia, nonzero, self.equations.constraint_names, self._branches)) is None:
             return
         names = [Name(name) for name in self._kinematics.velocity_labels]
-        columns = [[names[j] for j in places] for places in blocks.coordinates]
+        places, filled = blocks
+        columns = [[names[j] for j in group] for group in places]
         groups = [x for k, part in enumerate(columns) for x in ("; " if k else "", *listed(part))]
         joints = dict.fromkeys(label.partition(".")[0] for label in self.equations.constraint_names)
         yield Sentence(("In blocks, of the coordinates ", *groups, f", and of the joints {', '.join(joints)}:"))
@@ -501,11 +480,8 @@ class PrintedParts:
         rows = [[x if i == k else ZERO for i in range(len(columns))] for k, x in enumerate(diagonal)]
         yield _row((Letter(M.letter), Matrix(tuple(map(tuple, rows)))))
         rows = [
-            [
-                Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if any(held[i][j] for i in r for j in c) else ZERO
-                for b, c in enumerate(blocks.coordinates)
-            ]
-            for a, r in enumerate(blocks.equations)
+            [Letter(rf"\mathbf{{{C.letter}}}_{{{a + 1}{b + 1}}}") if there else ZERO for b, there in enumerate(row)]
+            for a, row in enumerate(filled)
         ]
         yield _row((Letter(C.letter), Matrix(tuple(map(tuple, rows)))))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -11,8 +12,10 @@ from ..elements.frames import GROUND, Frame, Marker
 from ..errors import UnavailableError
 from ..expr import vectors as vec
 from ..expr.core import Expr, substitute, symbols_of
-from ..expr.differentiate import gradient, vjp
+from ..expr.differentiate import gradient, jacobian, vjp
+from ..expr.evaluate import evaluate
 from ..expr.schedule import count
+from ..expr.tensors import solve_symmetric
 from ..expr.vectors import Vec3
 from ..mechanics import Kinematics
 from ..mechanics.methods import METHODS
@@ -21,6 +24,7 @@ from ..mechanics.methods.tree_equations import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..mechanics.wrenches import potential_energy, virtual_power
 from ..model.equations import differentiate
+from .symbols import momentum_names, multiplier_names, twist_rate_names, wrench_names
 
 # -- generalized forces ------------------------------------------------------------------------------------------------
 
@@ -29,7 +33,6 @@ from ..model.equations import differentiate
 
 
 GRAVITY = "gravity"  #: name of the entry of gravity
-POTENTIAL, FORCES, DISSIPATION = "potential", "forces", "dissipation"  #: entries of a bare Lagrangian
 
 
 def forces_by_element(kinematics: Kinematics) -> dict[str, list[Expr]]:
@@ -62,9 +65,9 @@ def _of_lagrangian(kinematics: Kinematics) -> dict[str, list[Expr]]:
     assert equations is not None
     drag = gradient(bare.dissipation, list(kinematics.v))
     result = {
-        POTENTIAL: _downhill(kinematics, equations.potential_energy),
-        FORCES: list(bare.forces),
-        DISSIPATION: [-d for d in drag],
+        "potential": _downhill(kinematics, equations.potential_energy),
+        "forces": list(bare.forces),
+        "dissipation": [-d for d in drag],
     }
     return {name: force for name, force in result.items() if not all(x.is_zero for x in force)}
 
@@ -142,6 +145,14 @@ READABLE = 400  #: operations an expression, on average, up to which expressions
 LONGEST = 5_000  #: operations of all of them together
 
 
+class Formed(NamedTuple):
+    """Expressions of a quantity, None or names that stand in them with values, in order, and what else is known."""
+
+    flat: Sequence[Expr]
+    named: Sequence[tuple[str, Expr]] | None = None
+    extra: Any = None
+
+
 class Written(NamedTuple):
     """SymPy expressions, with the named parts that they use, each after those that it uses."""
 
@@ -214,6 +225,24 @@ class SpatialMotion(NamedTuple):
     center_of_mass: Any
 
 
+class BlockSystem(NamedTuple):
+    """A linear system of a method: ``matrix * unknowns = right``; of equations SymPy matrices.
+
+    Attributes
+    ----------
+    matrix : sympy.Matrix
+        (n, n)
+    unknowns : sympy.Matrix
+        (n, 1), accelerations, reactions and multipliers.
+    right : sympy.Matrix
+        (n, 1)
+    """
+
+    matrix: Any
+    unknowns: Any
+    right: Any
+
+
 class Quantities:
     """Every quantity of one derivation, in a graph of its own, each formed when first used."""
 
@@ -227,6 +256,12 @@ class Quantities:
         m = self.kinematics.mechanism
         values = {p.name: 1.0 + 0.1 * k if p.value is None else p.value for k, p in enumerate(m.parameters)}
         return values | {u.name: u.value for u in m.inputs} | {"t": 0.0}
+
+    @property
+    def numbers_elsewhere(self) -> dict[str, float]:
+        """The same with a position that is not the reference, where coordinates may be singular."""
+        places = enumerate(zip(self.kinematics.names, self.mobility.q_reference, strict=True))
+        return self.numbers | {name: x + 0.3 + 0.1 * k for k, (name, x) in places}
 
     # -- energies ---------------------------------------------------------------------------------------------------
     def _require_energy(self, what: str, keys: tuple[str, ...]) -> None:
@@ -291,9 +326,8 @@ class Quantities:
     @cached_property
     def mass_matrix(self) -> Rows:
         """M (n_dof, n_dof)."""
-        return (
-            self.transformation.mass_matrix(self.equations.mass_matrix) if self._embeds else self.equations.mass_matrix
-        )
+        mass = self.equations.mass_matrix
+        return self.transformation.mass_matrix(mass) if self._embeds else mass
 
     @cached_property
     def force(self) -> Row:
@@ -331,15 +365,10 @@ class Quantities:
         return self.embedded_force(self.tree_quadratic_velocity)
 
     @cached_property
-    def tree_forces(self) -> dict[str, Row]:
-        """Generalized forces on the tree (n_v,) by force element."""
-        self._require_separate("generalized forces")
-        return {name: tuple(force) for name, force in forces_by_element(self.kinematics).items()}
-
-    @cached_property
     def forces(self) -> dict[str, Row]:
         """Generalized forces (n_dof,) by force element."""
-        return {name: self.along_independent(force) for name, force in self.tree_forces.items()}
+        self._require_separate("generalized forces")
+        return {name: self.along_independent(force) for name, force in forces_by_element(self.kinematics).items()}
 
     @cached_property
     def total_force(self) -> Row:
@@ -348,6 +377,11 @@ class Quantities:
         for force in self.forces.values():
             total = [a + b for a, b in zip(total, force, strict=True)]
         return tuple(total)
+
+    @property
+    def sampled_values(self) -> Row:
+        """What sampled states become."""
+        return tuple(x for _, x in self.kinematics.sampled)
 
     # -- constraints --------------------------------------------------------------------------------------------------
     @property
@@ -425,3 +459,114 @@ class Quantities:
         """Coordinates of cut joints as functions of the tree's."""
         loop = self.kinematics.loop_coordinates
         return dict(zip(loop.names, loop.values, strict=True))
+
+    # -- of single methods --------------------------------------------------------------------------------------------
+    def require_method(self, what: str, *methods: str) -> None:
+        """Refuse a quantity of other methods, which the message lists."""
+        if self.tree.method not in methods:
+            have = " or ".join(repr(name) for name in methods)
+            raise UnavailableError(f"method {self.tree.method!r} has no {what}; derive the model with method={have}")
+
+    @property
+    def gibbs_function(self) -> Expr:
+        """S = v' . M v' / 2 - Q_v . v' on the tree, the energy of acceleration less what has no accelerations."""
+        self.require_method("function of Gibbs and Appell", "gibbs_appell")
+        a, mass = self.kinematics.a, self.equations.mass_matrix
+        total = self.graph.zero
+        for i, x in enumerate(a):
+            row = 0.5 * mass[i][i] * x - self.tree_quadratic_velocity[i]
+            for j in range(i):
+                row = row + mass[i][j] * a[j]
+            total = total + row * x
+        return total
+
+    @property
+    def hamiltonian(self) -> Expr:
+        """H = (p - b) . M^-1 (p - b) / 2 - T_0 + V with T = v . M v / 2 + b . v + T_0 (Goldstein, sec. 8.1)."""
+        self.require_method("Hamiltonian", "hamilton")
+        kinematics, tree, graph = self.kinematics, self.tree, self.graph
+        names = momentum_names(kinematics)
+        momenta = [graph.symbol(name) for name in names]
+        still = dict.fromkeys(kinematics.v, graph.zero)
+        *linear, at_rest = substitute([*self.momenta, tree.kinetic_energy], still)
+        moved = [p - b for p, b in zip(momenta, linear, strict=True)]
+        total = graph.zero
+        for x, rate in zip(moved, solve_symmetric(self.equations.mass_matrix, moved), strict=True):
+            total = total + x * rate
+        result = 0.5 * total - at_rest + tree.potential_energy
+        if not math.isfinite(float(evaluate([result], self.numbers_elsewhere | dict.fromkeys(names, 1.0))[0])):
+            raise UnavailableError(
+                "the mass matrix of the spanning tree has no inverse, so that H is no function of the momenta; give "
+                "every body a mass and an inertia"
+            )
+        return result
+
+    @property
+    def momentum_rates(self) -> Row:
+        """p' = -dH/dq + Q (n_v,) in terms of q and v, without the forces of constraints."""
+        self.require_method("rates of momenta", "hamilton")
+        return self.tree.canonical[len(self.kinematics.v) :]
+
+    @property
+    def block_system(self) -> BlockSystem:
+        """The system that the method solves for accelerations and reactions.
+
+        ``augmented``: [M C_q^T; C_q 0] [v'; lambda] = [Q + Q_v; -gamma], redundant constraints left out.
+        """
+        self.require_method("block system", "augmented", "newton_euler", "amalgamated")
+        kinematics, system, zero = self.kinematics, self.tree.system, self.graph.zero
+        if self.tree.method == "augmented" or system is None:
+            C, equations = self.constraint_jacobian, self.equations
+            upper = [(*row, *(line[i] for line in C)) for i, row in enumerate(equations.mass_matrix)]
+            lower = [(*line, *(zero for _ in C)) for line in C]
+            unknowns = (*(str(a.node[1]) for a in kinematics.a), *multiplier_names(kinematics, len(self.rows)))
+            return BlockSystem((*upper, *lower), unknowns, (*(-h for h in equations.bias), *(-g for g in self.gamma)))
+        rows = [[zero] * len(system.unknowns) for _ in system.right]
+        for (i, j), entry in zip(system.places, system.entries, strict=True):
+            rows[i][j] = entry
+        return BlockSystem(tuple(map(tuple, rows)), self._unknown_names(len(system.unknowns)), system.right)
+
+    def _unknown_names(self, count: int) -> tuple[str, ...]:
+        """Names of the unknowns of newton_euler and amalgamated, in the order of the system.
+
+        Of each body ``rod_alpha_x`` .. and ``rod_a_x`` .., the rates of its twist in the axes of its joint, gravity
+        subtracted; of amalgamated also the accelerations of the joint; of its joint ``A_M_x`` .. and ``A_F_x`` .., the
+        wrench on the body at the joint; then the multipliers.
+        """
+        kinematics = self.kinematics
+        names: list[str] = []
+        for link, branch in zip(kinematics.links, kinematics.topology.branches, strict=True):
+            rates = [str(kinematics.a[link.first + c].node[1]) for c in range(len(link.columns))]
+            names += twist_rate_names(kinematics, link.name)
+            names += rates if self.tree.method == "amalgamated" else []
+            names += wrench_names(kinematics, kinematics.mechanism.joints[branch.joint].name)
+        return (*names, *multiplier_names(kinematics, count - len(names)))
+
+    @property
+    def body_velocity_transformation(self) -> Rows:
+        """B_b (6 n_b, n_dof) of M = B_b^T M_b B_b (Shabana, sec. 5.7).
+
+        The six velocities of a body are that of its centre of mass in ground axes, then its angular velocity in body
+        axes.
+        """
+        require_bodies(self.kinematics)
+        motion, v = self.kinematics.motion, list(self.kinematics.v)
+        velocities: list[Expr] = []
+        for body in self.kinematics.mechanism.bodies:
+            velocities += self.velocity(body.name).center_of_mass
+            velocities += motion.turning_of(self.markers[body.name], own_axes=True, rate=False)
+        entries = jacobian(velocities, v)
+        rows = [[entries.get((i, j), self.graph.zero) for j in range(len(v))] for i in range(len(velocities))]
+        return tuple(self.along_independent(row) for row in rows)
+
+    @property
+    def body_mass_matrix(self) -> Rows:
+        """M_b (6 n_b, 6 n_b), mass and inertia body by body."""
+        require_bodies(self.kinematics)
+        bodies = self.kinematics.mechanism.bodies
+        mass = [[self.graph.zero] * (6 * len(bodies)) for _ in range(6 * len(bodies))]
+        for k, body in enumerate(bodies):
+            for i in range(3):
+                mass[6 * k + i][6 * k + i] = body.mass
+                mass[6 * k + 3 + i][6 * k + 3 : 6 * k + 6] = body.inertia[i]
+        return tuple(map(tuple, mass))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from importlib import import_module
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from ..base.texts import acceleration_name, hint
@@ -18,19 +17,25 @@ from ..mechanics import Kinematics
 from ..mechanics.methods import TreeEquations
 from ..mechanics.mobility import Mobility
 from ..model.visit import Undotted
-from ..runtime.argument_checks import UnknownNameError
+from ..runtime.argument_checks import UnknownNameError, unknown
+from .free_bodies import BodiesApart
+from .quantities import (
+    BlockSystem,
+    Formed,
+    Quantities,
+    SpatialMotion,
+    Written,
+    is_short,
+    needed,
+    require_bodies,
+    with_derivatives,
+)
+from .symbols import model_notation, momentum_names, read_value, read_values, substitute_values
 
 if TYPE_CHECKING:
-    from .methods import BlockSystem
-    from .named_parts import ByName, NamedSum
+    from .named_parts import NamedSum
     from .near_state import SymbolicLinearization
-    from .quantities import Quantities, SpatialMotion, Written
-    from .tree_system import TreeParts, TreeSystem
-
-    Choose = Callable[[Quantities], Sequence[Expr]]
-    ChooseNames = Callable[[Quantities], Sequence[tuple[str, Expr]]]
-
-# What forms quantities is loaded when one is read: compiling needs none.
+    from .tree_system import TreeSystem
 
 # -- functions of time -------------------------------------------------------------------------------------------------
 
@@ -41,8 +46,6 @@ def dynamic_symbols(kinematics: Kinematics) -> Callable[[str], Any]:
     Velocities that are no rates of coordinates (``ball_wx``), inputs, momenta and multipliers are functions of time as
     well; parameters are plain symbols; t is ``dynamicsymbols._t``.
     """
-    from .methods import momentum_names
-
     orders: dict[str, tuple[str, int]] = {name: (name, 0) for name in kinematics.names}
     loop = kinematics.loop_coordinates.names
     for name in (*kinematics.names, *loop):
@@ -65,10 +68,7 @@ def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
 
     if name == "t":
         return dynamicsymbols._t
-    if name not in orders:
-        return sympy.Symbol(name)
-    base, order = orders[name]
-    return dynamicsymbols(base, order)
+    return dynamicsymbols(*orders[name]) if name in orders else sympy.Symbol(name)
 
 
 # -- rows of the table -------------------------------------------------------------------------------------------------
@@ -76,10 +76,9 @@ def _function_of_time(orders: Mapping[str, tuple[str, int]], name: str) -> Any:
 
 Made = TypeVar("Made")  #: what a quantity is
 Derived = tuple[Kinematics, Mobility, TreeEquations]
-Names = list[tuple[str, Expr]]
 #: What equations must have for a display to name a quantity among those to read next.
 ANY, BODIES, PARTS, LOOPS = "any", "bodies", "parts", "loops"
-SHOWN = 8  #: names that a message lists
+LISTED = 8  #: names that a message lists
 
 
 class Quantity(cached_property[Made]):
@@ -100,56 +99,96 @@ class Quantity(cached_property[Made]):
         self.name = name
 
 
-def scalar(
-    doc: str, offered: str = "", form: Callable[[Quantities], Expr] | None = None, prefix: str = ""
-) -> Quantity[Any]:
-    """A row of one expression, formed by the attribute of its name or by ``form``; its parts begin with ``prefix``."""
+# Rows are formed by the attribute ``form`` of Quantities, by default the one of their name.
+
+
+def scalar(doc: str, offered: str = "", prefix: str = "") -> Quantity[Any]:
+    """A row of one expression; its parts begin with ``prefix``."""
+    return Quantity(lambda eqs, n: eqs._write(n, lambda s: Formed([getattr(s, n)]), prefix)[0][0], doc, offered)
+
+
+def matrix(columns: Callable[[Readable], int], doc: str, offered: str = "", form: str = "") -> Quantity[Any]:
+    """A row of a SymPy matrix."""
 
     def make(equations: Readable, name: str) -> Any:
-        return equations._write(name, lambda s: [(form or attrgetter(name))(s)], prefix)[0]
+        def choose(quantities: Quantities) -> Formed:
+            rows = [(x,) if isinstance(x, Expr) else x for x in attrgetter(form or name)(quantities)]
+            return Formed([x for row in rows for x in row], extra=len(rows))
+
+        flat, rows = equations._write(name, choose)
+        return shaped(flat, (rows, columns(equations)))[0]
 
     return Quantity(make, doc, offered)
 
 
-def column(doc: str, offered: str = "", form: Choose | None = None) -> Quantity[Any]:
-    """A row of a SymPy column."""
-    return Quantity(
-        lambda eqs, name: eqs._matrix(name, lambda s: [(x,) for x in (form or attrgetter(name))(s)], 1), doc, offered
-    )
+#: A row of a SymPy column.
+column = partial(matrix, lambda _: 1)
 
 
-def matrix(
-    columns: Callable[[Readable], int],
+def each(
     doc: str,
+    what: str,
+    names: Callable[[Readable], Sequence[str]],
+    form: Callable[[Quantities, str], Iterable[Iterable[Expr]]],
+    build: Callable[[list[Any]], Made],
     offered: str = "",
-    form: Callable[[Quantities], Sequence[Sequence[Expr]]] | None = None,
-) -> Quantity[Any]:
-    """A row of a SymPy matrix."""
-    return Quantity(lambda eqs, name: eqs._matrix(name, form or attrgetter(name), columns(eqs)), doc, offered)
+) -> Quantity[ByName[Made]]:
+    """A row of quantities by name: parts of one are formed, and built of these in SymPy."""
+
+    def make(equations: Readable, name: str) -> ByName[Made]:
+        def one(part: str) -> Made:
+            flat, _ = equations._write(f"{name}.{part}", lambda s: Formed([x for xs in form(s, part) for x in xs]))
+            return build(flat)
+
+        return ByName(what, names(equations), one, equations._plain)
+
+    return Quantity(make, doc, offered, by_name=True)
 
 
-def quantity(offered: str = "", by_name: bool = False) -> Callable[[Callable[[Any], Made]], Quantity[Made]]:
+def symbols(doc: str, names: Callable[[Kinematics], Sequence[str]]) -> property:
+    """Symbols in SymPy, by their names."""
+    return property(lambda equations: equations._symbols(names(equations.kinematics)), doc=doc)
+
+
+def quantity(offered: str = "") -> Callable[[Callable[[Any], Made]], Quantity[Made]]:
     """A row that a method makes."""
-    return lambda make: Quantity(lambda eqs, _: make(eqs), make.__doc__, offered, by_name)
+    return lambda make: Quantity(lambda eqs, _: make(eqs), make.__doc__, offered)
 
 
-def _of_method(name: str) -> Callable[[Quantities], Any]:
-    """The function of this name that forms a quantity which single methods have."""
-    return lambda quantities: getattr(import_module(".methods", __package__), name)(quantities)
+class ByName(Mapping[str, Made]):
+    """Quantities by name, each made when first used; ``plain`` gives ``left_rod`` of ``left.rod``."""
+
+    def __init__(
+        self, what: str, names: Sequence[str], make: Callable[[str], Made], plain: Callable[[str], str]
+    ) -> None:
+        self._what, self._names, self._make, self._plain = what, tuple(names), make, plain
+        self._made: dict[str, Made] = {}
+
+    def __getitem__(self, name: str) -> Made:
+        if name not in self._names and isinstance(name, str):
+            name = self._plain(name)
+        if name not in self._names:
+            raise unknown(self._what, name, self._names)
+        if name not in self._made:
+            self._made[name] = self._make(name)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __repr__(self) -> str:
+        return f"<by {self._what}: {', '.join(self._names)}>"
 
 
-def _n(equations: Readable) -> int:
-    return int(equations.mobility.n_dof)
-
-
-def _n_v(equations: Readable) -> int:
-    return len(equations.kinematics.v)
-
-
-def _equations(left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
+def shaped(flat: Iterable[Any], *shapes: tuple[int, int]) -> list[Any]:
+    """SymPy matrices of these shapes, of the entries of all of them, row by row."""
     import sympy
 
-    return [sympy.Eq(a, b, evaluate=False) for a, b in zip(left, right, strict=True)]
+    entries = iter(flat)
+    return [sympy.Matrix(m, n, [next(entries) for _ in range(m * n)]) for m, n in shapes]
 
 
 class FreeBody(NamedTuple):
@@ -167,10 +206,40 @@ class FreeBody(NamedTuple):
     moment: list[Any]
 
 
+def _spatial_motion(flat: list[Any]) -> SpatialMotion:
+    return SpatialMotion(*shaped(flat, (3, 1), (3, 1), (3, 1)))
+
+
+def _equations(left: Sequence[Any], right: Sequence[Any]) -> list[Any]:
+    import sympy
+
+    return [sympy.Eq(a, b, evaluate=False) for a, b in zip(left, right, strict=True)]
+
+
+def _n(equations: Readable) -> int:
+    return int(equations.mobility.n_dof)
+
+
+def _n_v(equations: Readable) -> int:
+    return len(equations.kinematics.v)
+
+
+def _places(equations: Readable) -> tuple[str, ...]:
+    """Names of bodies and of named markers."""
+    require_bodies(equations.kinematics)
+    mechanism = equations.kinematics.mechanism
+    return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.presentation.named_markers))
+
+
+def _bodies_apart(equations: Readable) -> BodiesApart:
+    """The free bodies of the equations; other methods are refused."""
+    return BodiesApart(Quantities(*equations.fresh()))
+
+
 # -- the table ---------------------------------------------------------------------------------------------------------
 
 # A class that inherits :class:`Readable` says what was derived (``fresh``), what SymPy object stands for a name, and
-# what values are put in; :class:`~.displayed.ReadingView` is the same derivation with other answers.
+# what values are substituted; :class:`~.displayed.ReadingView` is the same derivation with other answers.
 
 
 class Readable(ABC):
@@ -186,10 +255,6 @@ class Readable(ABC):
     @abstractmethod
     def fresh(self) -> Derived:
         """A copy of what was derived, in a graph of its own."""
-
-    @abstractmethod
-    def again(self) -> Readable:
-        """The same with nothing made yet."""
 
     @property
     def name(self) -> str:
@@ -220,45 +285,21 @@ class Readable(ABC):
     @cached_property
     def notation(self) -> Notation:
         """How names are printed: ``.latex("theta1_dot")``, ``.text(name)``, ``.html(name)``, ``.mathtext(name)``."""
-        from .methods import model_notation
-
         return model_notation(self.kinematics, self.names_substituted)
 
     # -- symbols ------------------------------------------------------------------------------------------------------
     def _symbols(self, names: Sequence[str]) -> tuple[Any, ...]:
         return tuple(map(self._symbol, names))
 
-    @property
-    def q(self) -> tuple[Any, ...]:
-        """Coordinates of the spanning tree, SymPy symbols."""
-        return self._symbols(self.kinematics.names)
-
-    @property
-    def v(self) -> tuple[Any, ...]:
-        """Velocities of the spanning tree, SymPy symbols."""
-        return self._symbols(self.kinematics.velocity_names)
-
-    @property
-    def parameters(self) -> tuple[Any, ...]:
-        """Parameters, SymPy symbols."""
-        return self._symbols(self.kinematics.parameter_names)
-
-    @property
-    def states(self) -> tuple[Any, ...]:
-        """First-order states, SymPy symbols."""
-        return self._symbols(self.kinematics.state_names)
-
-    @property
-    def sampled(self) -> tuple[Any, ...]:
-        """Sampled states in the order of renewal, behind t for each of their clocks, SymPy symbols."""
-        return self._symbols([name for name, _ in self.kinematics.sampled])
-
-    @property
-    def momentum_symbols(self) -> tuple[Any, ...]:
-        """The symbols of the momenta in ``hamiltonian``, one for each of ``v``."""
-        from .methods import momentum_names
-
-        return self._symbols(momentum_names(self.kinematics))
+    q = symbols("Coordinates of the spanning tree, SymPy symbols.", lambda k: k.names)
+    v = symbols("Velocities of the spanning tree, SymPy symbols.", lambda k: k.velocity_names)
+    parameters = symbols("Parameters, SymPy symbols.", lambda k: k.parameter_names)
+    states = symbols("First-order states, SymPy symbols.", lambda k: k.state_names)
+    sampled = symbols(
+        "Sampled states in the order of renewal, behind t for each of their clocks, SymPy symbols.",
+        lambda k: [name for name, _ in k.sampled],
+    )
+    momentum_symbols = symbols("The symbols of the momenta in ``hamiltonian``, one for each of ``v``.", momentum_names)
 
     # -- energies -----------------------------------------------------------------------------------------------------
     T = scalar("Kinetic energy (J).", PARTS)
@@ -268,17 +309,12 @@ class Readable(ABC):
     # -- equations of motion ------------------------------------------------------------------------------------------
     @cached_property
     def _motion(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
-        import sympy
-
         n = self.mobility.n_dof
-        written = self._write("mass_matrix", lambda s: s.motion[0], "z", lambda s: s.motion[1])
+        flat, _ = self._write("mass_matrix", lambda s: Formed(*s.motion), "z")
         self._written["force"] = self._written["mass_matrix"]  # they are written together
         self._forms["force"] = self._forms["mass_matrix"]
-        return (
-            self._written["force"].intermediates,
-            sympy.Matrix(n, n, written[: n * n]),
-            sympy.Matrix(n, 1, written[n * n :]),
-        )
+        mass, force = shaped(flat, (n, n), (n, 1))
+        return self._written["force"].intermediates, mass, force
 
     mass_matrix = Quantity(lambda eqs, _: eqs._motion[1], "sympy.Matrix (n, n), n the degrees of freedom.", ANY)
     force = Quantity(
@@ -303,71 +339,52 @@ class Readable(ABC):
         ``.parts`` is a dict of all.  Gravity is ``"gravity"``; a bare Lagrangian has ``"potential"``, ``"forces"`` and
         ``"dissipation"``.
         """
-        import sympy
-
         from .named_parts import NamedSum
 
-        n = self.mobility.n_dof
-        names: list[str] = []
+        def choose(s: Quantities) -> Formed:
+            return Formed([*s.total_force, *(x for force in s.forces.values() for x in force)], extra=[*s.forces])
 
-        def choose(s: Quantities) -> list[Expr]:
-            names[:] = s.forces
-            return [*s.total_force, *(x for force in s.forces.values() for x in force)]
+        (flat, names), n = self._write("generalized_forces", choose, "Q_"), self.mobility.n_dof
+        total, *parts = shaped(flat, *[(n, 1)] * (1 + len(names)))
+        return NamedSum.of(total, dict(zip(names, parts, strict=True)), self._plain)
 
-        written = self._write("generalized_forces", choose, "Q_")
-        parts = {name: sympy.Matrix(n, 1, written[(k + 1) * n : (k + 2) * n]) for k, name in enumerate(names)}
-        return NamedSum.of(written[:n], parts, self._plain)
-
-    state_rates = column("s' (n_s, 1) of the first-order states ``states``.", form=attrgetter("kinematics.state_rates"))
+    state_rates = column("s' (n_s, 1) of the first-order states ``states``.", form="kinematics.state_rates")
     sampled_values = column(
         "What ``sampled`` become (n, 1), one after the other; for t: the time of the next sample.",
-        form=lambda s: [x for _, x in s.kinematics.sampled],
     )
 
     # -- motion of bodies and markers ---------------------------------------------------------------------------------
-    def _places(self) -> tuple[str, ...]:
-        """Names of bodies and of named markers."""
-        from .quantities import require_bodies
-
-        require_bodies(self.kinematics)
-        mechanism = self.kinematics.mechanism
-        return (*(b.name for b in mechanism.bodies), *(marker.label for marker in mechanism.presentation.named_markers))
-
-    @quantity(BODIES, by_name=True)
-    def poses(self) -> ByName[Any]:
-        """Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``."""
-        return self._by_name(
-            "body or marker", self._places(), lambda one: self._matrix(f"poses.{one}", lambda s: s.pose(one), 4)
-        )
-
-    @quantity(BODIES, by_name=True)
-    def velocities(self) -> ByName[SpatialMotion]:
-        """Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ..."""
-        make = partial(self._spatial, "velocities", lambda s, one: s.velocity(one))
-        return self._by_name("body or marker", self._places(), make)
-
-    @quantity(BODIES, by_name=True)
-    def accelerations(self) -> ByName[SpatialMotion]:
-        """Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ..."""
-        make = partial(self._spatial, "accelerations", lambda s, one: s.acceleration(one))
-        return self._by_name("body or marker", self._places(), make)
-
-    def _spatial(self, what: str, of: Callable[[Quantities, str], SpatialMotion], name: str) -> SpatialMotion:
-        import sympy
-
-        from .quantities import SpatialMotion
-
-        written = self._write(f"{what}.{name}", lambda s: [x for part in of(s, name) for x in part])
-        return SpatialMotion(*(sympy.Matrix(3, 1, written[k : k + 3]) for k in (0, 3, 6)))
-
-    @quantity(by_name=True)
-    def loop_coordinates(self) -> ByName[Any]:
-        """Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``."""
-
-        def make(one: str) -> Any:
-            return self._write(f"loop_coordinates.{one}", lambda s: [s.loop_coordinates[one]])[0]
-
-        return self._by_name("coordinate of a cut joint", self.kinematics.loop_coordinates.names, make)
+    poses = each(
+        'Pose (4, 4) of each body and named marker in ground axes: ``poses["rod"]``, ``poses["rod.tip"]``.',
+        "body or marker",
+        _places,
+        Quantities.pose,
+        lambda flat: shaped(flat, (4, 4))[0],
+        BODIES,
+    )
+    velocities = each(
+        'Velocity of each body and named marker, ground axes: ``velocities["rod"].angular``, ``.linear`` ...',
+        "body or marker",
+        _places,
+        Quantities.velocity,
+        _spatial_motion,
+        BODIES,
+    )
+    accelerations = each(
+        'Acceleration of each body and named marker, ground axes: ``accelerations["rod"].angular``, ``.linear`` ...',
+        "body or marker",
+        _places,
+        Quantities.acceleration,
+        _spatial_motion,
+        BODIES,
+    )
+    loop_coordinates = each(
+        'Coordinates of the joints that close loops, as functions of ``q``: ``loop_coordinates["s"]``.',
+        "coordinate of a cut joint",
+        lambda eqs: eqs.kinematics.loop_coordinates.names,
+        lambda s, one: [[s.loop_coordinates[one]]],
+        itemgetter(0),
+    )
 
     momenta = column("p = dT/dv (n_v, 1), conjugate to the velocities ``v``.", PARTS)
 
@@ -381,23 +398,22 @@ class Readable(ABC):
     )
     gamma = column("gamma (n_c, 1) of C'' = C_q v' + gamma = 0.", LOOPS)
     velocity_transformation = matrix(
-        _n, "B (n_v, n) of v = B v_i + b, v_i the velocities of ``independent``; b is ``velocity_offset``.", LOOPS,
-        attrgetter("transformation.matrix"),
-    )  # fmt: skip
+        _n,
+        "B (n_v, n) of v = B v_i + b, v_i the velocities of ``independent``; b is ``velocity_offset``.",
+        LOOPS,
+        "transformation.matrix",
+    )
     velocity_offset = column(
         "b (n_v, 1) of v = B v_i + b: what drivers and other motions over time add; 0 without them.",
-        form=attrgetter("transformation.offset"),
+        form="transformation.offset",
     )
-    acceleration_offset = column(
-        "a (n_v, 1) of v' = B v_i' + a.", form=attrgetter("transformation.acceleration_offset")
-    )
+    acceleration_offset = column("a (n_v, 1) of v' = B v_i' + a.", form="transformation.acceleration_offset")
 
     @cached_property
     def has_long_loops(self) -> bool:
         """Whether loops make ``mass_matrix`` and ``force`` so long that ``tree_system`` is read more easily."""
         if self.mobility.n_dof in (0, len(self.kinematics.v)):
             return False
-        from .quantities import Quantities
         from .tree_system import MANY, is_long
 
         return is_long(Quantities(*self.fresh())) or len(self.intermediates) > MANY
@@ -410,21 +426,12 @@ class Readable(ABC):
         ``has_long_loops``, ``zeros`` names the coordinates on which M and f do not depend; 0 stands for them in all
         parts.
         """
-        import sympy
-
         from .tree_system import TreeSystem, tree_parts
 
         n_v, n_c = len(self.kinematics.v), len(self.constraint_names)
-        formed: list[TreeParts] = []
-
-        def choose(quantities: Quantities) -> list[Expr]:
-            formed[:] = [tree_parts(quantities, self.has_long_loops)]
-            return formed[0].flat
-
-        written = iter(self._write("tree_system", choose, "z", lambda _: formed[0].named))
-        shapes = ((n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
-        mass, force, C, gamma = (sympy.Matrix(m, n, [next(written) for _ in range(m * n)]) for m, n in shapes)
-        return TreeSystem(mass, force, C, gamma, formed[0].zeros)
+        flat, zeros = self._write("tree_system", lambda s: tree_parts(s, self.has_long_loops), "z")
+        mass, force, C, gamma = shaped(flat, (n_v, n_v), (n_v, 1), (n_c, n_v), (n_c, 1))
+        return TreeSystem(mass, force, C, gamma, zeros)
 
     # -- of single methods; others refuse them and say which have them ----------------------------------------------
     body_velocity_transformation = matrix(
@@ -434,26 +441,19 @@ class Readable(ABC):
         Of each body the velocity of its centre of mass in ground axes, then its angular velocity in body axes.
         ``B_b.T * body_mass_matrix * B_b`` is ``mass_matrix``, less the inertia of drives.
         """,
-        form=_of_method("body_velocities"),
     )
     body_mass_matrix = matrix(
         lambda eqs: 6 * len(eqs.kinematics.mechanism.bodies),
         "M_b (6 n_b, 6 n_b): mass and inertia of each body, for the velocities of ``body_velocity_transformation``.",
-        form=_of_method("body_mass_matrix"),
     )
     gibbs_function = scalar(
-        "S (W^2 kg) of method ``gibbs_appell``: dS/dv' = M v' - Q_v on the tree; without terms free of v'.",
-        form=_of_method("gibbs_function"),
-        prefix="S_",
+        "S (W^2 kg) of method ``gibbs_appell``: dS/dv' = M v' - Q_v on the tree; without terms free of v'.", prefix="S_"
     )
     hamiltonian = scalar(
-        "H(q, p, t) (J) of method ``hamilton``, in the momenta ``p_theta``, ... of ``momentum_symbols``.",
-        form=_of_method("hamiltonian"),
-        prefix="H_",
+        "H(q, p, t) (J) of method ``hamilton``, in the momenta ``p_theta``, ... of ``momentum_symbols``.", prefix="H_"
     )
     momentum_rates = column(
-        "p' = -dH/dq + Q (n_v, 1) of method ``hamilton``, in q and v, without the forces of constraints.",
-        form=_of_method("momentum_rates"),
+        "p' = -dH/dq + Q (n_v, 1) of method ``hamilton``, in q and v, without the forces of constraints."
     )
 
     @quantity()
@@ -464,59 +464,38 @@ class Readable(ABC):
         the rates of its twist in the axes of its joint (``rod_alpha_x``, ``rod_a_x``; gravity subtracted) and the
         wrench of its joint (``A_M_x``, ``A_F_x``), then multipliers.
         """
-        import sympy
 
-        from .methods import BlockSystem, block_system
+        def choose(quantities: Quantities) -> Formed:
+            matrix, names, right = quantities.block_system
+            return Formed([*(x for row in matrix for x in row), *right], extra=names)
 
-        names: list[str] = []
+        flat, names = self._write("block_system", choose, "K_")
+        n = len(names)
+        matrix, right, unknowns = shaped([*flat, *self._symbols(names)], (n, n), (n, 1), (n, 1))
+        return BlockSystem(matrix, unknowns, right)
 
-        def choose(quantities: Quantities) -> list[Expr]:
-            result = block_system(quantities)
-            names[:] = result.unknowns
-            return [*(x for row in result.matrix for x in row), *result.right]
-
-        written, n = self._write("block_system", choose, "K_"), len(names)
-        parts = written[: n * n], list(self._symbols(names)), written[n * n :]
-        return BlockSystem(*(sympy.Matrix(n, len(x) // n if n else 0, x) for x in parts))
-
-    @quantity(by_name=True)
-    def free_bodies(self) -> ByName[FreeBody]:
+    free_bodies = each(
         """Newton's and Euler's equations of each body, of methods ``newton_euler`` and ``amalgamated``.
 
         Reactions of the joints of the tree are ``A_F_x``, ..., ``A_M_x``, ... on the body that the joint carries, at
         the joint, in ground axes; those of joints that close loops are written with their multipliers ``lambda_1``, ...
-        """
-        from .methods import BodiesApart
-        from .quantities import Quantities
-
-        BodiesApart(Quantities(*self.fresh()))  # refuses other methods now
-
-        def make(name: str) -> FreeBody:
-            written = self._write(f"free_bodies.{name}", lambda s: [x for p in BodiesApart(s).balance(name) for x in p])
-            equations = _equations([*written[:3], *written[6:9]], [*written[3:6], *written[9:]])
-            return FreeBody(equations[:3], equations[3:])
-
-        return self._by_name("body", [body.name for body in self.kinematics.mechanism.bodies], make)
-
-    @quantity(by_name=True)
-    def joint_forces(self) -> ByName[list[Any]]:
+        """,
+        "body",
+        lambda eqs: _bodies_apart(eqs).bodies,
+        lambda s, name: BodiesApart(s).balance(name),
+        lambda x: FreeBody(_equations(x[:3], x[3:6]), _equations(x[6:9], x[9:])),
+    )
+    joint_forces = each(
         """Of each joint of the tree an equation along each direction in which it is free: reaction = drive.
 
         The left side is the component of the reaction in ``free_bodies``; the right side what force elements and
         constraint elements exert along the coordinate, 0 if there are none.
-        """
-
-        from .methods import BodiesApart
-        from .quantities import Quantities
-
-        def make(name: str) -> list[Any]:
-            pairs = self._write(
-                f"joint_forces.{name}", lambda s: [x for p in BodiesApart(s).along_joint(name) for x in p]
-            )
-            return _equations(pairs[::2], pairs[1::2])
-
-        joints = BodiesApart(Quantities(*self.fresh())).joints  # refuses other methods
-        return self._by_name("joint of the tree", joints, make)
+        """,
+        "joint of the tree",
+        lambda eqs: _bodies_apart(eqs).joints,
+        lambda s, name: BodiesApart(s).along_joint(name),
+        lambda x: _equations(x[::2], x[1::2]),
+    )
 
     def linearize(self, at: Mapping[Any, Any] | None = None, *, equilibrium: bool = False) -> SymbolicLinearization:
         """The equations of motion near a state, x' = A x + B u, in symbols.
@@ -558,26 +537,16 @@ class Readable(ABC):
         [   0, 1],
         [-g/l, 0]])
         """
-        import sympy
-
         from .near_state import SymbolicLinearization, here, linearize, over_one_denominator
 
         values = self._read(at or {})
-        states: list[tuple[str, ...]] = []
-
-        def choose(quantities: Quantities) -> Sequence[Expr]:
-            result = linearize(quantities, values, equilibrium)
-            states.append(result.states)
-            return [x for matrix in (result.A, result.B) for row in matrix for x in row]
-
-        written = self._write("linearize", choose, "A_")
+        written, names = self._write("linearize", lambda s: linearize(s, values, equilibrium), "A_")
         named = self._written.pop("linearize").intermediates
         self._require_finite("linearize", [*written, *(x for _, x in named)], here(values))
         if not named:
             written = [over_one_denominator(x) for x in written]
-        (names,), inputs = states, self.kinematics.input_names
-        n = len(names)
-        A, B = sympy.Matrix(n, n, written[: n * n]), sympy.Matrix(n, len(inputs), written[n * n :])
+        n, inputs = len(names), self.kinematics.input_names
+        A, B = shaped(written, (n, n), (n, len(inputs)))
         return SymbolicLinearization(A, B, names, inputs, named)
 
     # -- how quantities are formed and written -------------------------------------------------------------------------
@@ -597,8 +566,8 @@ class Readable(ABC):
 
         return sympy.Symbol  # type: ignore[no-any-return]
 
-    #: Values that are put in for names, one mapping after the other.
-    _put_in: tuple[Mapping[str, Any], ...] = ()
+    #: Values that stand for names, one mapping after the other.
+    _substituted: tuple[Mapping[str, Any], ...] = ()
 
     @cached_property
     def _written(self) -> dict[str, Written]:
@@ -606,44 +575,27 @@ class Readable(ABC):
         return {}
 
     @cached_property
-    def _forms(self) -> dict[str, Callable[[], tuple[list[Expr], Names]]]:
-        """What gives each of these as the derivation formed it, with what names in it stand for."""
+    def _forms(self) -> dict[str, Callable[[], Formed]]:
+        """What gives each of these as the derivation formed it."""
         return {}
-
-    def _matrix(self, name: str, choose: Callable[[Quantities], Sequence[Sequence[Expr]]], columns: int) -> Any:
-        import sympy
-
-        rows: list[Sequence[Expr]] = []
-
-        def flat(quantities: Quantities) -> list[Expr]:
-            rows[:] = choose(quantities)
-            return [x for row in rows for x in row]
-
-        written = self._write(name, flat)
-        return sympy.Matrix(len(rows), columns, written)
-
-    def _by_name(self, what: str, names: Sequence[str], make: Callable[[str], Any]) -> ByName[Any]:
-        from .named_parts import ByName
-
-        return ByName(what, names, make, self._plain)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the functions that give quantities as they were formed."""
         return {name: value for name, value in vars(self).items() if name != "_forms"}
 
-    def _write(self, name: str, choose: Choose, prefix: str = "", choose_names: ChooseNames | None = None) -> list[Any]:
-        """Expressions of the quantities in SymPy; their named parts are kept under the name.
+    def _write(self, name: str, choose: Callable[[Quantities], Formed], prefix: str = "") -> tuple[list[Any], Any]:
+        """Expressions of the quantities in SymPy, and what else is known; their named parts are kept under the name.
 
         Each is formed in a copy of its own, so that what is read depends on the model alone.
         """
-        formed, names = self._form(choose, choose_names)
+        flat, named, extra = self._form(choose)
         prefix = prefix or f"{name.replace('.', '_')}_"
-        written = self.in_sympy(formed, prefix, names, of_motion=choose_names is not None)
-        if self._put_in:
+        written = self.in_sympy(flat, prefix, named or (), of_motion=named is not None)
+        if self._substituted:
             values = [*written.expressions, *(x for _, x in written.intermediates)]
             self._require_finite(name, values, f"with {self._view}")
-        self._written[name], self._forms[name] = written, partial(self._form, choose, choose_names)
-        return written.expressions
+        self._written[name], self._forms[name] = written, partial(self._form, choose)
+        return written.expressions, extra
 
     def in_sympy(
         self,
@@ -658,7 +610,6 @@ class Readable(ABC):
         written several times get names in any case.
         """
         from ..expr.simplify import WHOLE, joined_nodes, simplify
-        from .quantities import Written, is_short, with_derivatives
 
         k = self.kinematics
         rates = frozenset((*k.velocity_names, *map(acceleration_name, k.velocity_names)))
@@ -670,45 +621,26 @@ class Readable(ABC):
         named, result = form.sympy(self._symbol, k.parameter_names, prefix, of_motion)
         return Written([(name, with_derivatives(x)) for name, x in named], list(map(with_derivatives, result)))
 
-    def _form(self, choose: Choose, choose_names: ChooseNames | None) -> tuple[list[Expr], Names]:
-        """Expressions of the quantities with values put in, and what names in them stand for."""
-        from .methods import put_in
-        from .quantities import Quantities
-
-        quantities = Quantities(*self.fresh())
-        expressions = list(choose(quantities))
-        names = list(choose_names(quantities)) if choose_names is not None else []
-        expressions += [x for _, x in names]
-        for values in self._put_in:
-            expressions = put_in(expressions, values)
-        count = len(expressions) - len(names)
-        return expressions[:count], [(name, x) for (name, _), x in zip(names, expressions[count:], strict=True)]
-
-    def as_formed(self, name: str, part: str | None = None) -> tuple[Written, list[Expr], Names]:
-        """A quantity as it was written and, to compare with, as it was formed, with what names in that stand for.
-
-        Parts that were written together, such as those of generalized forces, are in the whole.
-        """
-        value, key = getattr(self, name), f"{name}.{part}"
-        if isinstance(value, Mapping) and part is not None:
-            value[part]
-        if key not in self._forms and name not in self._forms:  # made before this went through pickle
-            return self.again().as_formed(name, part)
-        key = key if key in self._forms else name
-        return self._written[key], *self._forms[key]()
+    def _form(self, choose: Callable[[Quantities], Formed]) -> Formed:
+        """Quantities with the values that were substituted."""
+        flat, named, extra = choose(Quantities(*self.fresh()))
+        names, parts = zip(*named, strict=True) if named else ((), ())
+        whole = [*flat, *parts]
+        for values in self._substituted:
+            whole = substitute_values(whole, values)
+        named = named and list(zip(names, whole[len(flat) :], strict=True))
+        return Formed(whole[: len(flat)], named, extra)
 
     def with_values(self, expressions: Sequence[Expr]) -> list[Expr]:
-        """Expressions of the model with what was put in, in a graph of their own; as they are, where nothing was."""
-        from .methods import put_in
-
-        result = copied(list(expressions)) if self._put_in else list(expressions)
-        for values in self._put_in:
-            result = put_in(result, values)
+        """Expressions of the model with the substituted values, in a graph of their own; as they are without any."""
+        result = copied(list(expressions)) if self._substituted else list(expressions)
+        for values in self._substituted:
+            result = substitute_values(result, values)
         return result
 
     def numbers_substituted(self) -> dict[str, float | None]:
-        """Numbers of the names for which values were put in, with declared values of what these hold; None without."""
-        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for named in self._put_in for name in named))
+        """Numbers of substituted names, with declared values of what their values hold; None where these have none."""
+        m, names = self.kinematics.mechanism, list(dict.fromkeys(name for named in self._substituted for name in named))
         quantities: list[Any] = [*m.parameters, *m.inputs]
         declared = {x.name: x.value for x in quantities if x.value is not None}
         graph = Graph()
@@ -720,8 +652,10 @@ class Readable(ABC):
 
     @property
     def _view(self) -> str:
-        """Values that were put in, for messages."""
-        return ", then ".join(", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._put_in)
+        """Values that were substituted, for messages."""
+        return ", then ".join(
+            ", ".join(f"{name} = {value}" for name, value in one.items()) for one in self._substituted
+        )
 
     def _require_finite(self, name: str, written: Sequence[Any], where: str) -> None:
         """Refuse a quantity that divides by zero."""
@@ -739,8 +673,6 @@ class Readable(ABC):
 
     def _read(self, named: Any, what: str = "symbol") -> dict[str, Any]:
         """Values that a user puts in for names."""
-        from .methods import read_values
-
         allowed = self.kinematics.parameter_names if what == "parameter" else self._known
         return read_values(named, allowed, what, self._plain)
 
@@ -777,7 +709,6 @@ class Readable(ABC):
         ([], m*s_dot**2/2)
         """
         from .named_parts import NamedSum
-        from .quantities import needed
 
         table = {row.name: row for row in self.rows()}
         if name not in table:
@@ -786,7 +717,7 @@ class Readable(ABC):
         value = getattr(self, name)
         if table[name].by_name:
             if part is None:
-                there = ", ".join(map(repr, tuple(value)[:SHOWN])) or "there are none"
+                there = ", ".join(map(repr, tuple(value)[:LISTED])) or "there are none"
                 raise incomplete(f"{name!r} are written one by one; give the name of one as part: {there}")
             whole = value[part]
             return self._written[f"{name}.{part if part in tuple(value) else self._plain(part)}"].intermediates, whole
@@ -798,7 +729,7 @@ class Readable(ABC):
         return needed(self._written[name].intermediates, value[part]), value[part]
 
     @property
-    def _own(self) -> tuple[str, ...]:
+    def _model_names(self) -> tuple[str, ...]:
         """Names of coordinates, their derivatives, parameters and inputs, and the time."""
         k = self.kinematics
         rates = (*k.velocity_names, *map(acceleration_name, k.velocity_names))
@@ -806,32 +737,26 @@ class Readable(ABC):
 
     @property
     def _known(self) -> tuple[str, ...]:
-        """Names for which values can be put in."""
-        from .methods import momentum_names
-
-        return (*self._own, *momentum_names(self.kinematics), *self.names_substituted)
+        """Names for which values can be substituted."""
+        return (*self._model_names, *momentum_names(self.kinematics), *self.names_substituted)
 
     @property
     def names_substituted(self) -> tuple[str, ...]:
-        """Names that the model does not have and that values put in have brought."""
-        from .methods import read_value
-
+        """Names that the model does not have and that substituted values have brought."""
         graph = Graph()
-        values = (read_value(graph, name, value) for named in self._put_in for name, value in named.items())
-        return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._own)))
+        values = (read_value(graph, name, value) for named in self._substituted for name, value in named.items())
+        return tuple(sorted({name for value in values for name in symbols_of([value])}.difference(self._model_names)))
 
     def values_substituted(self) -> list[list[tuple[str, Any]]]:
-        """What was put in, one list after the other: names, and numbers as given or SymPy expressions."""
-        return [[(name, self._as_given(value)) for name, value in named.items()] for named in self._put_in]
+        """What was substituted, one list after the other: names, and numbers as they are or SymPy expressions."""
 
-    def _as_given(self, value: Any) -> Any:
-        if isinstance(value, float | int):
-            return value
-        from .methods import read_value
+        def written(value: Any) -> Any:
+            is_number = isinstance(value, float | int)
+            return value if is_number else self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
 
-        return self.in_sympy([read_value(Graph(), "", value)]).expressions[0]
+        return [[(name, written(value)) for name, value in named.items()] for named in self._substituted]
 
     def symbols_substituted(self, names: Sequence[str]) -> list[Any]:
-        """What stands for names after values have been put in, in SymPy: their symbols, where none were."""
+        """What stands for names after substitution, in SymPy: their symbols, where none were."""
         graph = Graph()
         return self.in_sympy(self.with_values([graph.symbol(name) for name in names])).expressions

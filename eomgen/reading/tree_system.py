@@ -16,25 +16,13 @@ from ..base.operations import operations_with
 from ..expr.core import LEAVES, Expr, reachable, substitute, symbols_of
 from ..expr.identity import dependence, with_bounds
 from ..expr.schedule import count
-from .quantities import Quantities, Rows
+from .quantities import Formed, Quantities, Rows
 
 LONG = 330  #: operations of M and f from which their parts are shown instead
 SURELY = 1_500  #: operations beyond which nothing that is found equal makes them short
 MANY = 12  #: named parts of M and f more than which are shown in groups
 POINTS = 4  #: random positions at which it is tried whether a coordinate matters
 Named = list[tuple[str, Expr]]
-
-
-class TreeParts(NamedTuple):
-    """All entries of M_t (n_v, n_v), f_t (n_v,), C (n_c, n_v) and gamma (n_c,), and what stands in them.
-
-    ``named`` are names and values that stand in them, in order; ``zeros`` the coordinates on which M and f do not
-    depend, for which 0 stands in all parts.
-    """
-
-    flat: list[Expr]
-    named: Named
-    zeros: tuple[str, ...]
 
 
 class TreeSystem(NamedTuple):
@@ -71,8 +59,12 @@ def is_long(quantities: Quantities) -> bool:
     return count([*whole, *(x for _, x in named)]).total > LONG
 
 
-def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
-    """The parts; on request with names in them, and at 0 of what they do not depend on, which makes them shorter."""
+def tree_parts(quantities: Quantities, short: bool) -> Formed:
+    """All entries of M_t (n_v, n_v), f_t (n_v,), C (n_c, n_v) and gamma (n_c,).
+
+    On request with names in them, and at 0 of the coordinates on which M and f do not depend, which makes them shorter;
+    these coordinates are ``extra``.
+    """
     flat = [*_flat(quantities.equations.mass_matrix), *(-h for h in quantities.equations.bias)]
     flat += [*_flat(quantities.constraint_jacobian), *quantities.gamma]
     named: Named = []
@@ -83,7 +75,7 @@ def tree_parts(quantities: Quantities, short: bool) -> TreeParts:
         put = {graph.symbol(name): graph.zero for name in zeros}
         names, values = zip(*_motion_names(quantities), strict=True)
         flat, named = _with_names(substitute(flat, put), list(zip(names, substitute(values, put), strict=True)))
-    return TreeParts(flat, named, zeros)
+    return Formed(flat, named, zeros)
 
 
 def _flat(rows: Rows) -> list[Expr]:

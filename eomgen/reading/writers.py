@@ -65,13 +65,13 @@ def equations_text(equations: Readable, columns: int = COLUMNS, lines: int = LIN
 
 
 def _values(printed: PrintedEquations, columns: int) -> list[str]:
-    """What was put in."""
+    """What was substituted."""
     listed = ", ".join(printed.text(x).replace(" ", TIGHT) for x in printed.values)
     return [plain(line) for line in fold(listed, columns, "  with ", "    ")] if listed else []
 
 
 def _coordinates(printed: PrintedEquations, columns: int) -> Iterator[str]:
-    rows = [(printed.names.text(c.name), c.name, c.joint, c.unit, c.role) for c in printed.coordinates]
+    rows = [(printed.names.text(name), name, *others) for name, *others in printed.coordinates]
     if not rows:
         return
     sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -128,8 +128,8 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
         if max(map(len, rows), default=0) <= columns:
             break
 
-    def words(said: Text) -> str:
-        return written(said, lambda x: text(x, parts.names), str, str)
+    def in_text(sentence: Text) -> str:
+        return written(sentence, lambda x: text(x, parts.names), str, str)
 
     def equation(line: FormulaLine) -> Iterator[str]:
         left, right = line.sides
@@ -153,15 +153,15 @@ def _large(printed: PrintedEquations, columns: int) -> Iterator[str]:
             case Row():
                 yield from (line for one in item.lines for line in equation(one))
             case Sentence():
-                yield from fold(words(item.text), columns, "", "  ")
+                yield from fold(in_text(item.text), columns, "", "  ")
     groups = [item for item in items if isinstance(item, Folded)]
     yield from (
         "",
         "In groups:",
-        *(line for group in groups for line in fold(words(group.title), columns, "  ", "    ")),
+        *(line for group in groups for line in fold(in_text(group.title), columns, "  ", "    ")),
     )
     for group in groups:
-        yield from ("", *fold(words(group.title), columns, "", "  "))
+        yield from ("", *fold(in_text(group.title), columns, "", "  "))
         yield from (line for one in group.pieces if isinstance(one, FormulaLine) for line in equation(one))
 
 
@@ -307,8 +307,8 @@ def _facts(printed: PrintedEquations) -> Iterator[Piece]:
         whole = Sentence(("with ", *listed(values)))
         yield whole if len(values) <= FOLDED else Folded(f"with {len(values)} values", (whole,))
     if coordinates := printed.coordinates:
-        roles = any(c.role for c in coordinates)
-        rows = ((f"${printed.names.latex(c.name)}$", f"`{c.name}`", c.joint, c.unit, c.role) for c in coordinates)
+        roles = any(role for *_, role in coordinates)
+        rows = ((f"${printed.names.latex(name)}$", f"`{name}`", *others) for name, *others in coordinates)
         heads = ("coordinate", "name", "joint", "unit", "")
         table = Table(heads[: 4 + roles], tuple(one[: 4 + roles] for one in rows))
         yield table if len(coordinates) <= FOLDED else Folded(f"{len(coordinates)} coordinates", (table,))
@@ -319,7 +319,7 @@ def _facts(printed: PrintedEquations) -> Iterator[Piece]:
 
 
 def latex_formulas(equations: Readable, digits: int = DIGITS) -> list[str]:
-    """Each formula of the equations of motion, without dollars: M v' = f, what its names stand for, what was put in."""
+    """Each formula of the equations of motion, without dollars: M v' = f, its names, and substituted values."""
     printed = PrintedEquations(equations, digits)
     lines = [line for item in printed.items() for line in _latex(item, printed.page_names)]
     values = r",\quad ".join(latex(x, printed.names) for x in printed.values)
