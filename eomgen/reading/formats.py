@@ -104,7 +104,7 @@ class _Code:
             )
         symbols = set().union(*(x.free_symbols for x in whole), {symbol for symbol, _ in named})
         self.renamed = _renamed((str(s) for s in symbols), language.reserved | {"state_rates", "stateRates"}, form)
-        put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}
+        put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols} | {sympy.zoo: sympy.oo}  # 1/0 is infinite
         self.named = [(put[symbol], x.xreplace(put)) for symbol, x in named]
         self.mass, self.force = equations.mass_matrix.xreplace(put), equations.force.xreplace(put)
         self.states = [x.xreplace(put) for x in rates[1]]
