@@ -334,6 +334,7 @@ CASES: list[tuple[str, str, str, float, tuple[float, ...]]] = [
     ),
     ("forces", SHAPE + "shape: circle, radius: @}]}", "first[0].radius", 0.1, NOT_POSITIVE),
     ("forces", SPACE + "shape: ellipsoid, semi_axes: [0.1, 0.2, @]}]}", "first[0].semi_axes[2]", 0.1, NOT_POSITIVE),
+    ("forces", SPACE + "shape: cuboid, size: [0.3, @, 0.1]}]}", "first[0].size[1]", 0.1, NOT_POSITIVE),
     (
         "forces",
         SPACE + "shape: cuboid, size: [0.3, 0.2, 0.1], edge_radius: @}]}",

@@ -36,38 +36,6 @@ def cart() -> Any:
     return pushed("cython")
 
 
-TIMES, VALUES = np.array([0.0, 0.3, 0.5, 1.1, 2.0]), np.array([0.0, 1.0, -0.5, 2.0, 0.2])
-
-
-def twice(function: Any, times: np.ndarray, n: int = 200_001) -> np.ndarray:
-    """The second integral by the trapezoidal rule on a fine grid between the knots, where the input is smooth."""
-    grid = np.unique(np.concatenate([np.linspace(0, 2, n), TIMES]))
-    middle = function((grid[1:] + grid[:-1]) / 2)
-    h = np.diff(grid)
-    speed = np.concatenate([[0.0], np.cumsum(h * middle)])
-    place = np.concatenate([[0.0], np.cumsum(h * (speed[:-1] + h * middle / 2))])
-    return np.interp(times, grid, place)
-
-
-@pytest.mark.parametrize("method", ["RK45", "Radau"])
-@pytest.mark.parametrize("interpolation", ["zero-order", "linear", "cubic"])
-def test_tables_between_their_times(cart: Any, method: str, interpolation: str) -> None:
-    signal = eg.Signal(TIMES, VALUES, interpolation)
-    expected = {
-        "zero-order": lambda t: VALUES[np.searchsorted(TIMES, t, side="right") - 1],
-        "linear": lambda t: np.interp(t, TIMES, VALUES),
-        "cubic": CubicSpline(TIMES, VALUES),
-    }[interpolation]
-    asked = np.linspace(0, 2, 41)
-    run = cart.simulate((0, 2), inputs={"u": signal}, method=method, t_eval=asked, **TIGHT)
-    np.testing.assert_allclose(run["s"], twice(expected, asked), atol=1e-8)
-    inside = np.linspace(0.01, 1.99, 37)
-    np.testing.assert_allclose(signal(inside), expected(inside), rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(run["u"], signal(asked))
-    back = cart.simulate((2, 0), run.x[:, -1], inputs={"u": signal}, method=method, **TIGHT)
-    np.testing.assert_allclose(back.x[:, -1], 0.0, atol=1e-7)
-
-
 def test_a_held_table_is_exact_because_the_run_stops_at_its_jumps(cart: Any) -> None:
     times = np.arange(0, 2, 0.01)
     values = np.random.default_rng(3).normal(size=len(times))
@@ -76,14 +44,6 @@ def test_a_held_table_is_exact_because_the_run_stops_at_its_jumps(cart: Any) -> 
     place = np.cumsum(0.01 * speed[:-1] + 0.01**2 / 2 * values)[-1]
     assert held["s_dot"][-1] == pytest.approx(speed[-1], abs=1e-12)
     assert held["s"][-1] == pytest.approx(place, abs=1e-12)
-
-
-@pytest.mark.parametrize("method", ["DOP853", "RK23", "LSODA", "Radau"])
-def test_texts_of_time_state_and_parameters(cart: Any, method: str) -> None:
-    options = {"rtol": 1e-7, "atol": 1e-9} if method == "RK23" else TIGHT
-    run = cart.simulate((0, 3), {"s": 1.0}, {"k": 4.0}, inputs={"u": "-k*s"}, method=method, **options)
-    np.testing.assert_allclose(run["s"], np.cos(2 * run.t), atol=1e-5 if method == "RK23" else 1e-7)
-    np.testing.assert_allclose(run["u"], -4.0 * run["s"], atol=1e-12)
 
 
 def test_every_operation_means_the_same_on_a_tape(cart: Any) -> None:

@@ -169,14 +169,6 @@ def test_the_cause_is_named(linkage: Any, p: Any, added: float, u: Any, error: t
         linkage.bind(p=p).rhs(0.0, x, u=u)
 
 
-@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.thorough)])
-def test_a_parameter_that_takes_all_inertia_is_named(target: str) -> None:
-    m = eg.Model("wheel")
-    m.revolute("A", m.ground, m.body("b", mass=0, inertia={"zz": m.parameter("J", 1.0)}))
-    m.torque("t", "A", m.parameter("k", 1.0))
-    refuses("EG-SINGULAR A inertia", m.compile(target=target).rhs, 0.0, [0.1, 0.2], p=[0.0, 1.0])
-
-
 @pytest.fixture(autouse=True)
 def interrupts() -> Iterator[None]:
     """A process started in the background may ignore Ctrl-C."""
