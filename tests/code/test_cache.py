@@ -201,10 +201,16 @@ def test_list_prune_clear(copied: Path, tmp_path: Path) -> None:
     total = run("cache", "list", "--json").json
     assert {"library", "object", "model"} <= {entry["kind"] for entry in total["entries"]}
     assert total["size"] == sum(entry["size"] for entry in total["entries"])
+    keys = {"key", "kind", "name", "directory", "size", "created", "used"}
+    assert {frozenset(entry) for entry in total["entries"]} == {frozenset(keys)}
+    assert "pendulum" in run("cache").out
     write_unit(tmp_path)  # used again
     assert [entry["name"] for entry in entries()] == ["pendulum", "double_pendulum"]
     assert run("cache", "prune", "--older-than", "150").code == 0
     assert [entry["name"] for entry in entries()] == ["pendulum"]
+    left = run("cache", "list", "--json").json
+    pruned = run("cache", "prune", "--max-size", "0", "--json").json
+    assert (set(pruned["removed"]), pruned["freed"]) == ({entry["key"] for entry in left["entries"]}, left["size"])
     for _ in range(2):  # of nothing, too
         assert run("cache", "clear").code == 0
         assert run("cache", "list", "--json").json["entries"] == []

@@ -163,24 +163,6 @@ def test_a_wheel_between_two_sides_bends_one_state_by_both() -> None:
     assert 0 < faster < both
 
 
-def test_a_roller_on_both_flanks_of_a_seat() -> None:
-    """Wider than the seat it lies on both flanks, 65 degrees from the radius: each slides at v cos 65 degrees."""
-    m, (a,) = scenes.planar("seat", 1, (0, 0, 0))
-    wheel = {"shape": "sprocket", "teeth": 8, "pitch": 0.1, "seat": 0.02, "tip_radius": 0.15, "on": m.ground}
-    m.contacts("touch", wheel, {"shape": "circle", "on": a, "radius": 0.03}, {**LUGRE, "lateral": False})
-    mod = m.compile(target="numpy")
-    reach = 0.05 / np.sin(np.pi / 8)
-    x = mod.x0(j0_x=reach + 0.01, j0_y_dot=0.3)
-    push = (mod.mass_matrix(x[:3]) @ mod.rhs(0.0, np.concatenate([x[:3], np.zeros(4)]))[3:6])[0]
-    push /= 2 * np.cos(np.radians(65))  # on each flank
-    assert push > 100
-    wanted = 2 * np.sqrt(1e3 * push) * 0.3 * np.cos(np.radians(65))
-    assert abs(mod.rhs(0.0, x)[6]) == pytest.approx(wanted, rel=1e-9)
-    x = mod.x0(j0_x=reach + 0.01, j0_y=0.001, j0_x_dot=0.1, j0_y_dot=0.3, j0_3_dot=-4.0, touch_bristle_1=3e-5)
-    wanted = differences(mod, x)
-    np.testing.assert_allclose(mod.jacobian(0.0, x), wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
-
-
 def test_lateral_belongs_to_states() -> None:
     m, (a,) = scenes.planar("road", 1)
     ground = {"shape": "half_plane", "on": m.ground}

@@ -1,5 +1,6 @@
 """Mobility: rank, freedoms, redundant rows by name, candidates, contradictions; what is said of them."""
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -423,3 +424,25 @@ def test_flipped_solutions_are_rejected_by_the_module(target: str) -> None:
     assert upright(mod, mod.x0(a=np.pi)[: mod.n_q]) == pytest.approx(1.0, abs=1e-12)
     refuses("EG-LOOP-OPEN flipped", mod.x0, a=np.pi, b=0.0)
     assert all(upright(mod, q) > 0 for q in mod.branches())
+
+
+def test_what_a_note_advises_to_leave_out_leaves_the_freedom() -> None:
+    """Redundant rows of planets: what a note advises to leave out leaves one degree of freedom."""
+
+    def epicyclic(keep: set[str]) -> Any:
+        m = eg.Model("epi")
+        sun, arm = m.body("sun", mass=1, inertia={"zz": 1e-3}), m.body("arm", mass=1, inertia={"zz": 5e-3})
+        s, c = m.revolute("S", m.ground, sun, coordinate="th_s"), m.revolute("C", m.ground, arm, coordinate="th_c")
+        for i in range(3):
+            a = 2 * np.pi * i / 3
+            p = m.body(f"p{i}", mass=0.6, inertia={"zz": 4e-4})
+            joint = m.revolute(f"P{i}", arm.at(0.1 * np.cos(a), 0.1 * np.sin(a), 0), p, coordinate=f"th_{i}")
+            if f"g{i}" in keep:
+                m.planetary(f"g{i}", sun=s, carrier=c, planet=joint, teeth={"sun": 24, "planet": 18, "ring": 60})
+        return m.check()
+
+    whole = {"g0", "g1", "g2"}
+    notes = " ".join(map(str, epicyclic(whole).notes))
+    advice = re.search(r"leave ([\w, ]+?) out", notes)
+    left_out = set(re.findall(r"g\d", advice.group(1))) if advice else set()
+    assert epicyclic(whole - left_out).degrees_of_freedom == 1

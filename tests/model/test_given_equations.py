@@ -535,3 +535,27 @@ def test_what_could_leave_the_formula_is_refused() -> None:
         problem = told[f"parameters.p{k}.latex"]
         assert word in f"{problem.message}; {problem.remedy}", latex
         assert str(problem).isprintable()
+
+
+def test_a_quaternion_whose_norm_is_a_constraint_takes_long_steps(tmp_path: Path) -> None:
+    """Four Euler parameters and three speeds with e.e = 1 as a constraint."""
+    mod = load(
+        tmp_path,
+        """name: quat
+equations:
+  coordinates: [e0, e1, e2, e3]
+  velocities: [wx, wy, wz]
+  rates:
+    {e0: -(e1*wx + e2*wy + e3*wz)/2, e1: (e0*wx + e2*wz - e3*wy)/2, e2: (e0*wy + e3*wx - e1*wz)/2,
+     e3: (e0*wz + e1*wy - e2*wx)/2}
+  mass_matrix: [[1, 0, 0], [0, 2, 0], [0, 0, 3]]
+  forcing: [-wy*wz, 2*wx*wz, -wx*wy]
+  constraints: [e0**2 + e1**2 + e2**2 + e3**2 - 1]
+initial: {e0: 1, wx: 0.01, wy: 2, wz: 0.01}
+""",
+    ).compile(target="numpy")
+    x = mod.x0()
+    x[:4] *= 1 + 1e-9
+    mod.rhs(0.0, x)
+    steps = len(mod.simulate(0.05).t)
+    assert steps < 60, f"{steps} steps for 0.05 s"

@@ -487,3 +487,15 @@ def test_every_field_option_and_flag_has_been_looked_at() -> None:
     members = [*mujoco.mjtDisableBit.__members__, *mujoco.mjtEnableBit.__members__]
     flags = {name.partition("_")[2] for name in members if name not in ("mjNDISABLE", "mjNENABLE")}
     assert flags == set(KNOWN_FLAGS.split())
+
+
+def test_a_weld_between_bodies_that_stand(tmp_path: Path) -> None:
+    """It holds nothing, and the model compiles."""
+    text = (
+        '<mujoco><worldbody><body name="a"><freejoint/><geom size=".1"/></body><body name="post">'
+        '<geom size=".1" pos="2 0 0"/></body>'
+        '<body name="rail"><geom size=".1" pos="3 0 0"/></body></worldbody><equality>'
+        '<weld name="w" body1="post" body2="rail"/></equality></mujoco>'
+    )
+    (tmp_path / "standing.xml").write_text(text)
+    eg.load(tmp_path / "standing.xml").compile(target="numpy")

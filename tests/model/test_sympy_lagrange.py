@@ -15,8 +15,10 @@ from sympy.physics.mechanics import (
     Particle,
     Point,
     ReferenceFrame,
+    RigidBody,
     System,
     dynamicsymbols,
+    inertia,
 )
 from sympy_systems import (
     bicycle,
@@ -485,3 +487,32 @@ def test_forces_of_auxiliary_speeds_that_do_not_follow_are_named() -> None:
     refuses("EG-UNDETERMINED equations F N 2 1 inputs=", eg.from_sympy, kane, "bead")
     values = {"m": 1.0, "g": 9.81, "mu": 0.1, "c": 0.5}
     assert eg.from_sympy(kane, "bead", values, inputs=["F"]).compile(target="numpy").u_names == ("F",)
+
+
+def test_quaternion_rates_written_implicitly() -> None:
+    """Kinematics of a quaternion as angular velocity = given and e.e' = 0, norm as configuration constraint."""
+    e = e0, e1, e2, e3 = dynamicsymbols("e0:4")
+    w = dynamicsymbols("w1:4")
+    i1, i2, i3, m = sympy.symbols("i1:4 m")
+    t = dynamicsymbols._t
+    ground, body, point = ReferenceFrame("A"), ReferenceFrame("B"), Point("O")
+    body.orient_quaternion(ground, e)
+    point.set_vel(ground, 0)
+    own = body.ang_vel_in(ground)
+    given = w[0] * body.x + w[1] * body.y + w[2] * body.z
+    body.set_ang_vel(ground, given)
+    kd = [(own - given).dot(a) for a in (body.x, body.y, body.z)] + [sum(a * a.diff(t) for a in e)]
+    kane = KanesMethod(
+        ground,
+        q_ind=[e1, e2, e3],
+        q_dependent=[e0],
+        u_ind=w,
+        kd_eqs=kd,
+        configuration_constraints=[sum(a**2 for a in e) - 1],
+        explicit_kinematics=False,
+    )
+    kane.kanes_equations([RigidBody("b", point, body, m, (inertia(body, i1, i2, i3), point))], [])
+    mod = eg.from_sympy(kane, "spin", parameters={i1: 1.0, i2: 2.0, i3: 3.0}, guess={"e0": 1.0}).compile(target="numpy")
+    x = {"e0": 0.8, "e1": 0.36, "e2": 0.48, "e3": 0.0, "w1": 0.3, "w2": 0.2, "w3": 0.5}
+    got = dict(zip(mod.x_names, mod.rhs(0.0, [x[n] for n in mod.x_names]), strict=False))
+    np.testing.assert_allclose([got["w1"], got["w2"], got["w3"]], [-0.1, 0.15, -0.02], atol=1e-10)

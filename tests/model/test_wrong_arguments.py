@@ -351,6 +351,13 @@ CASES: list[tuple[str, str, str, float, tuple[float, ...]]] = [
     ),
     ("forces", "{type: stop, joint: ja, lower: 0.2, upper: @, stiffness: 10}", "upper", 1.0, (0.2, 0.1)),
     ("forces", "{type: sphere_plane, between: [ground, a], radius: @, stiffness: 1}", "radius", 0.1, NOT_POSITIVE),
+    (
+        "forces",
+        SPHERES.replace("[0.1, 0.1]", "[@, 0.1]") + "moduli: [1e9, 1e9], poisson: [0.3, 0.3]}",
+        "radii[0]",
+        0.1,
+        (0.0,),
+    ),
     ("forces", SPHERES + "moduli: [1e9, @], poisson: [0.3, 0.3]}", "moduli[1]", 1e9, NOT_POSITIVE),
     ("forces", SPHERES + "moduli: [1e9, 1e9], poisson: [@, 0.3]}", "poisson[0]", 0.5, (-1.0, 0.6)),
     ("forces", "{type: friction, joint: ja, viscous: @}", "viscous", 0.0, NEGATIVE),

@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import command
 import mpmath
 import numpy as np
 import pytest
@@ -233,21 +232,6 @@ def test_a_run_takes_the_declared_steps(path: Path) -> None:
     assert len(swing.simulate(method="RK45", rtol=1e-3).t) < 50
     many = swing.simulate_many(initial={"q": [1.0, 0.5]})
     np.testing.assert_allclose(many.x[:, 0], run.x[:, -1], rtol=1e-12)
-
-
-def test_the_command_line_takes_them(path: Path) -> None:
-    def run(*words: object) -> Any:
-        return command.run("run", *words, "--json").json
-
-    declared, given = run(path), run(path, "--solver", "rk4", "--step", "0.01")
-    assert declared["final"] == given["final"]
-    other = run(path, "--solver", "DOP853")
-    assert other["final"] != declared["final"]
-    assert other["final"]["q"] == pytest.approx(declared["final"]["q"], abs=1e-7)
-    assert run(path, "--step", "0.02")["final"] != declared["final"]
-    refused = command.run("run", path, "--solver", "RK45", "--step", "0.1")
-    assert refused.code == 2
-    assert "RK4" in refused.err
 
 
 def test_steps_are_of_order_four() -> None:

@@ -277,12 +277,6 @@ def test_controllers_that_cannot_be_are_refused(module: Any) -> None:
         eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
 
 
-def test_ida_samples_too(module: Any) -> None:
-    pytest.importorskip("sksundae")
-    run = module.dae.solve((0.0, 1.05), rtol=1e-9, atol=1e-11)
-    assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-6
-
-
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_held_input_beside_a_controller_has_the_value_of_its_own_time(target: str) -> None:
     """Where the compiled loop asks Python for a new state, a law of its clock must not see the run's first part."""

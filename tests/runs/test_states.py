@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from model_files import load
 from models import IN_C
 from refusals import refuses
 from scipy.integrate import solve_ivp
@@ -380,14 +381,6 @@ def test_many_runs_are_single_runs() -> None:
         np.testing.assert_allclose(many.x[:, k], single, rtol=0.0, atol=1e-8)
 
 
-def test_the_differential_algebraic_form_has_the_same_motion() -> None:
-    mod = lag_module()
-    form = mod.dae
-    y, rates = form.initial(mod.x0())
-    assert np.abs(form.residual(0.0, y, rates)).max() < 1e-13
-    np.testing.assert_allclose(rates[:3], matrix() @ mod.x0(), atol=1e-14)
-
-
 def test_a_driven_mechanism_integrates_its_states() -> None:
     """s = 0.1 sin 3 t is prescribed; a' = s' - 4 a has a closed form."""
     m = eg.Model("driven")
@@ -412,3 +405,13 @@ def test_an_impact_leaves_states_alone() -> None:
     before = solve_ivp(flight, (0, fall), [1, 0, 0], rtol=1e-11, atol=1e-13).y[:, -1]
     after = solve_ivp(flight, (fall, 1), [0, -0.8 * before[1], before[2]], rtol=1e-11, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(traj.x[:, -1], after, atol=1e-8)
+
+
+def test_states_without_freedoms(tmp_path: Path) -> None:
+    """First-order and sampled states beside bodies that cannot move: s' = -s from 2; s -> s/2 + 1 every 0.1 s."""
+    text = "name: w\nbodies: {b: {mass: 1}}\njoints: {j: {type: weld, between: [ground, b]}}\n"
+    text += 'states: {s: {rate: "-s", initial: 2}, z: {sampled: "0.5*z+1", period: 0.1, initial: 4}}\n'
+    for target in ("numpy", "cython"):
+        run = load(tmp_path, text).compile(target=target).simulate((0, 0.25))
+        assert run["s"][-1] == pytest.approx(2 * np.exp(-0.25), abs=1e-7)
+        assert run["z"][-1] == 2 + 2 / 2**3  # samples at 0, 0.1 and 0.2 s
