@@ -397,12 +397,3 @@ def test_every_call_of_a_locked_structure_answers(make: object, target: str) -> 
     assert mod.equilibrium().stability == "no freedom"
     assert mod.linearize().A.shape == (0, 0)
     assert target == "cython" or mod.verify().ok
-
-
-@pytest.mark.parametrize("target", TARGETS)
-def test_welds_that_rebound_values_part_are_named(target: str) -> None:
-    mod = held_twice().compile(target=target)
-    refuses("EG-LOOP-OPEN 0.1", mod.simulate, 1.0, parameters={"l3": 0.4})
-    bound = mod.bind(p={"l3": 0.4})
-    for call in (lambda: bound.rhs(0, []), lambda: bound.project([]), lambda: bound.reactions(0, [])):
-        refuses("EG-PROJECTION .r_x 0.1", call)
