@@ -474,11 +474,7 @@ def pile(sizes: Any, law: Any, **more: Any) -> eg.Model:
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("sizes", "places"),
-    [
-        ([(0.2, 0.3, 0.1), (0.3, 0.1, 0.2)], 4),
-        ([(0.2, 0.2, 0.2)] * 2, 8),
-        ([(0.3, 0.3, 0.2), (0.2, 0.2, 0.2)], 4),
-    ],
+    [([(0.2, 0.3, 0.1), (0.3, 0.1, 0.2)], 4), ([(0.2, 0.2, 0.2)] * 2, 8), ([(0.3, 0.3, 0.2), (0.2, 0.2, 0.2)], 4)],
 )
 def test_flush_cuboids_rest_on_corners(sizes: Any, places: int) -> None:
     """The upper one sinks m g / (n k): its four corners and, where they lie on corners, those of the lower one.

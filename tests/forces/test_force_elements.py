@@ -257,11 +257,7 @@ def rub(sliding: np.ndarray, mu: float, static: float, stribeck: float, viscous:
     return -(level / np.hypot(s, smoothing) + viscous) * sliding
 
 
-CONTACTS = {
-    "point_plane": {},
-    "sphere_plane": {"radius": 0.25},
-    "sphere_sphere": {"radii": (0.4, "k/90")},
-}
+CONTACTS = {"point_plane": {}, "sphere_plane": {"radius": 0.25}, "sphere_sphere": {"radii": (0.4, "k/90")}}
 LAW = {"stiffness": 400, "exponent": 1.5, "restitution": 0.6, "velocity": 2, "formula": "flores"}
 RUB = {"friction": 0.3, "static_friction": 0.5, "stribeck": 0.2, "viscous_friction": 0.1, "smoothing": 0.05}
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import force_judges as bench
 import judges
-import models
 import numpy as np
 import pytest
 from force_judges import Seen, Wrench, differences, problems
@@ -171,53 +170,6 @@ def test_an_end_inside_the_cylinder_is_an_error_that_names_the_element() -> None
     mod = m.compile(target="numpy")
     assert np.isfinite(mod.rhs(0.0, np.array([0.4, 0.0]))).all()
     refuses("EG-NOT-FINITE cord", mod.rhs, 0.0, np.array([0.2, 0.0]))
-
-
-def test_a_muscle_over_a_joint_reproduces_the_published_arm() -> None:
-    """An arm on a lever with biceps and triceps (SymPy's tutorial), the triceps wrapped around the elbow."""
-    given = models.reference("muscle_lever_sympy")
-    p = given["parameters_SI"]
-    lA, lC, lD, r = p["lA"], p["lC"], p["lD"], p["r"]
-    m = eg.Model("arm", gravity=(0, 0, p["g"]))
-
-    axial: dict[str, float] = {}
-
-    def rod(name: str, mass: float, length: float, along: int, at: float) -> Any:
-        thin: list[Any] = [mass * length**2 / 12] * 3
-        thin[along] = m.parameter(f"I{name}", mass * length**2 / 12)  # the tutorial's m l^2 / 2 no rod has: given later
-        axial[f"I{name}"] = mass * length**2 / 2
-        center = [0.0, 0.0, 0.0]
-        center[along] = at
-        return m.body(name, mass=mass, com=center, inertia=thin)
-
-    A, C, D = rod("A", p["mA"], lA, 1, 0.0), rod("C", p["mC"], lC, 2, lC / 2), rod("D", p["mD"], lD, 2, lD / 2)
-    B = m.body("B", mass=0)
-    m.revolute("q1", m.ground.at(p["dx"], 0, 0), A, coordinate="q1")
-    m.revolute("q2", m.ground.at(0, p["dy"], p["dz"]), B, axis="y", coordinate="q2")
-    m.revolute("q3", B, C, coordinate="q3")
-    m.revolute("q4", C.at(0, 0, lC), D, axis="y", coordinate="q4")
-    m.spherical("hand", A.at(0, lA, 0), D.at(0, 0, lD))
-    m.torsional_element("grip", "q1", law=f"-{p['k']}*angle - {p['c']}*rate")
-    elbow = C.at(0, 0, lC, rpy=(-np.pi / 2, 0, 0))  # its z axis is y of the upper arm
-    for name, ends, via in (
-        ("biceps", (C.at(0, 0, lC / 3), D.at(0, 0, lD / 3)), []),
-        ("triceps", (C.at(0, 0, lC / 3), D.at(0, 0, lD / 3)), [{"around": elbow, "radius": r, "sense": "positive"}]),
-    ):
-        own = p[name]
-        sizes = {"force_max": own["F_max"], "fiber_length": own["l_opt"], "slack_length": own["l_slack"]}
-        m.muscle(name, *ends, activation=0, **sizes, via=via)
-    q = given["own"]["q0"]
-    m.initial(**{f"q{k + 1}": value for k, value in enumerate(q)})
-    m.guess(q1=q[0], q2=q[1], q3=q[2], q4=q[3])
-    for method in ("embedding", "lagrange"):
-        mod = m.compile(method=method, target="numpy")
-        x = np.zeros(mod.n_x)
-        for k, value in enumerate(q):
-            x[mod.x_names.index(f"q{k + 1}")] = value
-        assert np.abs(mod.constraints(x[: mod.n_q])).max() < 1e-9
-        a = mod.rhs(0.0, x, p=[axial[name] for name in mod.p_names])[mod.n_q :]
-        found = [a[mod.v_names.index(f"q{k}_dot")] for k in range(1, 5)]
-        np.testing.assert_allclose(found, given["own"]["qdd0"], rtol=1e-7)
 
 
 def test_faults_of_paths_are_reported_by_place() -> None:

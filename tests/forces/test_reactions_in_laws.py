@@ -44,10 +44,7 @@ def spatial_tree(kind: str, late: bool = True) -> eg.Model:
     return with_all_reactions(m, "AB")
 
 
-@pytest.mark.parametrize(
-    ("kind", "late"),
-    [*((kind, True) for kind in KINDS), ("revolute", False), ("screw", False)],
-)
+@pytest.mark.parametrize(("kind", "late"), [*((kind, True) for kind in KINDS), ("revolute", False), ("screw", False)])
 def test_outputs_are_the_reactions_of_every_kind_of_joint(kind: str, late: bool) -> None:
     """Those of ``reactions`` of the module are summed up from numbers, and without what acts along coordinates."""
     mod = spatial_tree(kind, late).compile(target="numpy")

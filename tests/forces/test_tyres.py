@@ -537,10 +537,7 @@ def test_what_is_wrong_with_creep_is_reported(keys: dict[str, object], told: str
     refuses(told, m.check)
 
 
-@pytest.mark.parametrize(
-    ("law", "told"),
-    [("linear", "rolling"), ("polach", "rolling Painleve's")],
-)
+@pytest.mark.parametrize(("law", "told"), [("linear", "rolling"), ("polach", "rolling Painleve's")])
 def test_rest_is_detected_by_the_speed_of_rolling(law: str, told: str) -> None:
     """Creepages are divided by the speed of the axle along the track; the ends of a spring have no part in it."""
     mod = wheelset(law).compile(target="numpy").bind(p={"V": 0.0})

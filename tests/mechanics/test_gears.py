@@ -491,7 +491,7 @@ def test_a_rounded_wheel_keeps_its_energy() -> None:
 
 
 # -- Convex bodies -----------------------------------------------------------------------------------------------------
-MASS, INERTIA = 1.3, (0.004, 0.005, 0.007)
+INERTIA = (0.004, 0.005, 0.007)
 
 
 def rattleback(flip: bool = True) -> eg.Model:

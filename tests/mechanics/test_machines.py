@@ -203,23 +203,6 @@ def test_the_ram_of_a_shaper_is_where_lever_and_link_hold_it() -> None:
     assert traj["s"] == pytest.approx(end[0] + np.sqrt(p["l"] ** 2 - (p["h"] - end[1]) ** 2), abs=1e-9)
 
 
-def test_a_shaper_returns_quickly() -> None:
-    """Norton, Design of Machinery: it turns back where the crank is across the lever, after pi + 2 asin(r/d)."""
-    mod, p = compiled("shaper")
-    phi = np.arcsin(p["r"] / p["d"])
-    q = mod.x0(theta=0.0)[: mod.n_q]
-    s, ends = mod.q_names.index("s"), []
-    for theta in np.linspace(0.0, -2 * np.pi, 41):
-        q, v, _ = mod.kinematics([theta], [-1.0], [0.0], q)
-        if abs(np.sin(theta) + np.sin(phi)) > 0.02:
-            assert (v[s] > 0) == (np.sin(theta) > -np.sin(phi)), theta
-    for theta in (-phi, np.pi + phi):
-        q, v, _ = mod.kinematics([theta - 2 * np.pi], [-1.0], [0.0], q)
-        assert abs(v[s]) < 1e-12
-        ends.append(q[s])
-    assert abs(ends[0] - ends[1]) == pytest.approx(2 * p["L"] * p["r"] / p["d"], rel=1e-12)
-
-
 def test_watts_six_bar_is_where_its_circles_meet() -> None:
     mod, p = compiled("watt_six_bar")
     traj = mod.simulate(0.6, t_eval=np.linspace(0.0, 0.6, 31))

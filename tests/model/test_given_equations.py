@@ -1,5 +1,6 @@
 """Equations that are given: in files and in Python, with rates q' = N(q, t) v + b(q, t), without an energy."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -76,10 +77,8 @@ def test_constraints_with_given_rates(target: str) -> None:
     assert off[0] ** 2 + off[1] - 0.3 * off[2] - 0.1 * t == pytest.approx(0.5, abs=1e-12)
     refuses("EG-UNSUPPORTED coordinates velocities", getattr, module, "minimal")
     refuses("EG-NAME-UNKNOWN a_dot r", module.x0, a_dot=1.0)
-    with refused("EG-REFERENCE p p="):
-        given("named", coordinates=["a"], velocities=["p"], mass_matrix=[[1]], forcing=[0]).compile(target="numpy").x0(
-            p=1.0
-        )
+    named = given("named", coordinates=["a"], velocities=["p"], mass_matrix=[[1]], forcing=[0])
+    refuses("EG-REFERENCE p p=", named.compile(target="numpy").x0, p=1.0)
 
 
 def test_what_no_velocity_changes_is_closed_by_the_nearest_coordinates() -> None:
@@ -102,9 +101,8 @@ def test_speeds_and_coordinates_that_differ_in_number(n: int, k: int, blade: boo
     mass = [["2 + cos(q0)" if i == j else 0.1 for j in range(k)] for i in range(k)]
     forcing = [f"-q{i % n} - 0.3*s{i}*s{(i + 1) % k}" for i in range(k)]
     rows = [f"s{k - 1} - 0.5*s0*cos(q0)"] if blade else []
-    model = given(
-        "differ", coordinates=q, velocities=v, rates=rates, mass_matrix=mass, forcing=forcing, constraints=rows
-    )
+    moving = {"coordinates": q, "velocities": v, "rates": rates}
+    model = given("differ", **moving, mass_matrix=mass, forcing=forcing, constraints=rows)
     module, t = model.compile(target=target), 0.4
     x = module.project(np.random.default_rng(n).uniform(-1.0, 1.0, n + k), t=t)
     p, s = x[:n], x[n:]
@@ -256,23 +254,14 @@ initial: {x: 0.2, w: 1.0, spin: 2.0}
 
 def ball(texts: bool) -> eg.Model:
     value = (lambda text: text) if texts else sympy.sympify
-    if texts:
-        M = [["m*r**2*7/5", 0, 0], [0, "m", 0], [0, 0, "0.4*m*r**2"]]
-    else:
-        M = sympy.diag(*map(sympy.sympify, ("m*r**2*7/5", "m", "0.4*m*r**2")))
+    M = [[value("m*r**2*7/5"), 0, 0], [0, value("m"), 0], [0, 0, value("0.4*m*r**2")]]
     m = eg.Model.from_equations(
-        "ball",
-        ["x", "y", "phi"],
-        M,
-        [value("-k*r*x"), value("-0.1*v_y"), 0],
-        velocities=["w", "v_y", "spin"],
-        rates={"x": value("r*w"), "y": value("v_y"), "phi": value("spin")},
-        constraints=[value("v_y - r*spin")],
-        multipliers=["grip"],
+        "ball", ["x", "y", "phi"], M if texts else sympy.Matrix(M), [value("-k*r*x"), value("-0.1*v_y"), 0],
+        velocities=["w", "v_y", "spin"], rates={"x": value("r*w"), "y": value("v_y"), "phi": value("spin")},
+        constraints=[value("v_y - r*spin")], multipliers=["grip"], potential_energy=value("k*x**2/2"),
         kinetic_energy=value("m*r**2*w**2*7/10 + m*v_y**2/2 + 0.2*m*r**2*spin**2"),
-        potential_energy=value("k*x**2/2"),
         parameters={"r": 0.3, "m": 2, "k": 5},
-    )
+    )  # fmt: skip
     m.output("friction", "grip")
     m.initial(x=0.2, w=1.0, spin=2.0)
     return m
@@ -299,9 +288,8 @@ def test_functions_of_time() -> None:
     def make(**more: float) -> eg.Model:
         force = tau - m * g * l * sympy.sin(theta) - theta.diff(t) / 10
         known = {m: 2.0, l: 0.5} | {sympy.Symbol(name): value for name, value in more.items()}
-        return eg.Model.from_equations(
-            "p", [theta], sympy.Matrix([[m * l**2]]), [force], parameters=known, inputs={tau: 0.3}
-        )
+        mass = sympy.Matrix([[m * l**2]])
+        return eg.Model.from_equations("p", [theta], mass, [force], parameters=known, inputs={tau: 0.3})
 
     assert list(make().parameters) == ["m", "l", "g"]
     refuses("EG-MISSING parameters.g", lambda: make().compile(target="numpy"))
@@ -344,16 +332,7 @@ initial: {theta1: 0.3, s_dot: 0.2}
 
 
 GIVEN = {"m_c": r"m_{\rm c}", "push": "F_p", "s": "x_{w}", "turn_2": r"\psi", "E": r"\mathcal{E}"}
-PLAIN = TEXT
-for said in (
-    r", latex: 'm_{\rm c}'",
-    ", latex: F_p",
-    ", latex: 'x_{w}'",
-    r", latex: {turn_2: \psi}",
-    r", latex: '\mathcal{E}'",
-):
-    assert said in PLAIN
-    PLAIN = PLAIN.replace(said, "")
+PLAIN = re.sub(r", latex: ('.*?'|F_p|\{.*?\})", "", TEXT)
 
 
 def test_python_says_the_same_as_the_file(tmp_path: Path) -> None:
@@ -487,40 +466,14 @@ def test_what_is_wrong_is_reported_with_its_place(change: tuple[str, str], messa
 
 #: What no symbol has -> a word of the message.
 REFUSED = {
-    "{}": "nothing",
-    "$m$": "'$'",
-    "m}": "'}'",
-    "m_{c": "'{'",
-    "m_": "_",
-    "_c": "'_'",
-    "a_b_c": "twice",
-    r"\dot": "nothing after",
-    r"\dot{}": "nothing",
-    "m\\": "backslash",
-    r"m\\n": r"\\",
-    r"\input{/etc/passwd}": r"\input",
-    r"\write18{ls}": r"\write",
-    r"\href{javascript:alert(1)}{x}": r"\href",
-    r"\def\x{y}": r"\def",
-    r"\csname input\endcsname": r"\csname",
-    r"\catcode`\$=12": r"\catcode",
-    r"\begin{matrix}": r"\begin",
-    r"\color{red}x": r"\color",
-    r"\(": r"\(",
-    "m%": "'%'",
-    "m&n": "'&'",
-    "m#1": "'#'",
-    "m~n": "'~'",
-    '"': "'\"'",
-    "<script>alert(1)</script>": "'<'",
-    "θ": r"θ",
-    "x\x00": "U+0000",
-    "x\u202e": "U+202E",
-    r"\text{a_b}": "'_'",
-    r"\thet": r"\thet",
-    "x" * 121: "121",
-    "{" * 9 + "x" + "}" * 9: "groups",
-}
+    "{}": "nothing", "$m$": "'$'", "m}": "'}'", "m_{c": "'{'", "m_": "_", "_c": "'_'", "a_b_c": "twice",
+    r"\dot": "nothing after", r"\dot{}": "nothing", "m\\": "backslash", r"m\\n": r"\\",
+    r"\input{/etc/passwd}": r"\input", r"\write18{ls}": r"\write", r"\href{javascript:alert(1)}{x}": r"\href",
+    r"\def\x{y}": r"\def", r"\csname input\endcsname": r"\csname", r"\catcode`\$=12": r"\catcode",
+    r"\begin{matrix}": r"\begin", r"\color{red}x": r"\color", r"\(": r"\(", "m%": "'%'", "m&n": "'&'", "m#1": "'#'",
+    "m~n": "'~'", '"': "'\"'", "<script>alert(1)</script>": "'<'", "θ": r"θ", "x\x00": "U+0000", "x\u202e": "U+202E",
+    r"\text{a_b}": "'_'", r"\thet": r"\thet", "x" * 121: "121", "{" * 9 + "x" + "}" * 9: "groups",
+}  # fmt: skip
 
 
 def test_what_could_leave_the_formula_is_refused() -> None:
@@ -539,9 +492,7 @@ def test_what_could_leave_the_formula_is_refused() -> None:
 
 def test_a_quaternion_whose_norm_is_a_constraint_takes_long_steps(tmp_path: Path) -> None:
     """Four Euler parameters and three speeds with e.e = 1 as a constraint."""
-    mod = load(
-        tmp_path,
-        """name: quat
+    text = """name: quat
 equations:
   coordinates: [e0, e1, e2, e3]
   velocities: [wx, wy, wz]
@@ -552,8 +503,8 @@ equations:
   forcing: [-wy*wz, 2*wx*wz, -wx*wy]
   constraints: [e0**2 + e1**2 + e2**2 + e3**2 - 1]
 initial: {e0: 1, wx: 0.01, wy: 2, wz: 0.01}
-""",
-    ).compile(target="numpy")
+"""
+    mod = load(tmp_path, text).compile(target="numpy")
     x = mod.x0()
     x[:4] *= 1 + 1e-9
     mod.rhs(0.0, x)

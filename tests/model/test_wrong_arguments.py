@@ -431,6 +431,10 @@ def held() -> dict[str, Any]:
 def test_names_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
     with pytest.raises(AttributeError, match=rf"has no attribute '{word}'; did you mean '?{meant}\b"):
         getattr(held[kind], word)
+    assert not hasattr(held[kind], word)
+    assert getattr(held[kind], word, 3) == 3
+    with pytest.raises(AttributeError, match="zzz"):
+        held[kind].zzz  # noqa: B018
 
 
 @pytest.mark.parametrize(

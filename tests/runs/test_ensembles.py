@@ -525,11 +525,7 @@ def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
         with refused("EG-FILE-DAMAGED block_000000.npz"):
             pendulum.simulate_many(1, angles(20), store=folder)
     block.write_bytes(good)
-    for other in (
-        "{}",
-        "[" * 99999,
-        text.replace('"block": 10', '"block": -1'),
-    ):
+    for other in ("{}", "[" * 99999, text.replace('"block": 10', '"block": -1')):
         manifest.write_text(other)
         with refused("EG-FILE-DAMAGED ensemble"):
             pendulum.simulate_many(1, angles(20), store=folder)

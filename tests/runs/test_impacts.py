@@ -92,11 +92,8 @@ def one_of_the_sets(A: Any, need: Any, involved: Any) -> Any:
             g = np.zeros(len(need))
             g[chosen] = np.linalg.lstsq(A[np.ix_(chosen, chosen)], need[chosen], rcond=1e-12)[0] if chosen else 0.0
             slack = (A @ g - need)[involved]
-            if (
-                (g >= -1e-12).all()
-                and (slack >= -1e-10).all()
-                and np.abs((A @ g - need)[chosen]).max(initial=0) < 1e-10
-            ):
+            met = np.abs((A @ g - need)[chosen]).max(initial=0) < 1e-10
+            if (g >= -1e-12).all() and (slack >= -1e-10).all() and met:
                 return g
     raise AssertionError("no set fits")
 

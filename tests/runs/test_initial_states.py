@@ -73,6 +73,24 @@ def test_more_than_needed_is_taken_where_it_fits(crank: eg.Module) -> None:
     refuses("EG-REFERENCE positions", crank.assemble, theta_dot=1.0)
 
 
+@pytest.mark.parametrize("case", ["inline", "offset"])
+def test_kinematics_equal_the_closed_form_over_a_full_turn(crank: eg.Module, case: str) -> None:
+    """Reference: slider_crank_kinematics.json (closed form, 17 digits); between its rows, the same formula."""
+    data = models.reference("slider_crank_kinematics")["reference"][case]
+    p = {name: float(data[name]) for name in "rle"}
+    mod, rows = crank.bind(p), data["rows"]
+    angles = np.deg2rad(np.array([float(key) for key in rows]))
+    q, v, a = mod.kinematics(angles[None], np.full((1, len(angles)), 10.0), np.full((1, len(angles)), 3.0))
+    for j, row in enumerate(rows.values()):
+        assert q[2, j] == pytest.approx(float(row["x"]), abs=1e-14)
+        assert q[0, j] + q[1, j] == pytest.approx(float(row["rod_angle"]), abs=1e-13)
+        assert v[2, j] == pytest.approx(float(row["v"]), abs=1e-12)
+        assert a[2, j] == pytest.approx(float(row["a"]), abs=1e-11)
+        assert a[0, j] + a[1, j] == pytest.approx(float(row["rod_alpha"]), abs=1e-11)
+    theta = np.linspace(0, 2 * np.pi, 100)
+    np.testing.assert_allclose(mod.kinematics(theta[None])[0][2], placed(theta, **p), atol=1e-13)
+
+
 def test_the_slider_cannot_be_given_a_velocity_at_a_dead_centre(crank: eg.Module) -> None:
     mod, r, l = crank.bind({"e": 0.0}), 0.15, 0.5
     refuses("EG-CONTRADICTION s_dot 1 theta_dot", mod.x0, s=r + l, s_dot=1.0)

@@ -408,10 +408,7 @@ def test_models_without_series_say_so() -> None:
     body = m.body("mass", mass=1.0)
     m.prismatic("J", m.ground, body, axis="x", coordinate="s")
     m.torque("push", "J", "-max(s, 0)")
-    for target, why in (
-        ("cython", "max"),
-        ("numpy", "target='numpy'"),
-    ):
+    for target, why in (("cython", "max"), ("numpy", "target='numpy'")):
         refuses(f"EG-UNSUPPORTED stop Taylor {why}", m.compile(target=target).simulate, 1, method="Taylor")
 
 

@@ -20,10 +20,7 @@ from sweeps import part_of
 import eomgen as eg
 
 
-@pytest.mark.parametrize(
-    "rotation",
-    ["euler_angles", pytest.param("euler_parameters", marks=pytest.mark.thorough)],
-)
+@pytest.mark.parametrize("rotation", ["euler_angles", pytest.param("euler_parameters", marks=pytest.mark.thorough)])
 def test_a_disc_that_falls_flat_ends_its_run(rotation: str) -> None:
     """A thin disc that leans 0.2 rad at rest rolls about no axle: (m r^2/4 + m r^2) lean'' = m g r sin(lean)."""
     rate = lambda lean: np.sqrt(2 * 9.81 / 1.25 * (np.cos(0.2) - np.cos(lean)))  # noqa: E731

@@ -340,7 +340,7 @@ def test_joints_tell_their_axes() -> None:
     assert "S slides along the axis x" in text
     assert r"the axis $\mathbf{n}_z$ = (0.6, 0, 0.8)" in text
     assert [row.split(" | ")[4] for row in re.findall(r"^\| (`\w+` \| .*) \|$", text, re.M)] == [
-        *("z", "-y", "x", "(0.6, 0, 0.8)"),
+        *("z", "-y", "x", "(0.6, 0, 0.8)")
     ]
 
 
