@@ -6,8 +6,7 @@ from typing import Any
 import contact_scenes as scenes
 import numpy as np
 import pytest
-from contact_scenes import ELASTIC, LAW, PLANAR, near, on
-from flying_bodies import check_slopes, depth_of, flying, state
+from contact_scenes import ELASTIC, LAW, PLANAR, check_slopes, depth_of, flying, near, on, state
 from force_judges import differences, read_back
 from refusals import refuses
 from scipy.integrate import quad

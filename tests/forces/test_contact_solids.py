@@ -6,8 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from contact_scenes import near
-from flying_bodies import ELASTIC, STIFF, check_slopes, depth_of, flying, state
+from contact_scenes import ELASTIC, STIFF, check_slopes, depth_of, flying, near, state
 from force_judges import differences
 from models import IN_C
 from mujoco_judge import EDGE, ROUNDED, Distances
@@ -29,8 +28,6 @@ ALL = [
     {"shape": "ellipsoid", "semi_axes": (0.2, 0.1, 0.08)},
     {"shape": "cuboid", "size": (0.3, 0.2, 0.12)},
 ]
-
-
 #: Place and turn of each of these on its body.
 MARKERS = [
     (np.array([0.25 * k - 0.4, 0.02 * k, 0]), Rotation.from_euler("xyz", (0.2 * k, 0.5, -0.3))) for k in range(len(ALL))

@@ -201,23 +201,6 @@ def test_it_does_not_matter_where_a_loop_is_cut():
     assert found == pytest.approx([found[0]] * 3, rel=1e-10)
 
 
-def test_jacobian_of_a_loop():
-    """Along the constraints, where differences of rhs do not depend on the projection."""
-    mod = slider_crank(0.15, 0.3).compile(target="numpy")
-    h = 1e-4
-
-    def at(step):
-        return mod.x0(theta=0.9 + step[0], theta_dot=7.0 + step[1])
-
-    J = mod.jacobian(0.0, at((0, 0)))
-    for e in np.eye(2):
-        ends = [at(k * h * e) for k in (-2, -1, 1, 2)]
-        weights = np.array([1.0, -8.0, 8.0, -1.0]) / (12 * h)
-        dx = sum(w * x for w, x in zip(weights, ends, strict=True))
-        df = sum(w * mod.rhs(0.0, x) for w, x in zip(weights, ends, strict=True))
-        assert J @ dx == pytest.approx(df, rel=1e-6, abs=1e-6)
-
-
 def sliding_rod(mu: float | str) -> eg.Model:
     """A uniform rod of length 2 whose lower end slides on rough ground."""
     m = eg.Model("painleve", gravity=(0, -G, 0))

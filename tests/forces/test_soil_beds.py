@@ -161,14 +161,6 @@ def test_forces_of_steady_rolling(wheels: eg.Module, slip: float) -> None:
     assert abs(found[2] - torque) < 0.02 * size * RADIUS
 
 
-def test_compaction_resistance(wheels: eg.Module) -> None:
-    """Bekker's b k z^(n+1) / (n + 1), less what the rebound behind the wheel gives back, p^2 / (2 k_u)."""
-    for z in (0.02, 0.05):
-        top = modulus(WIDTH) * z**N
-        wanted = WIDTH * (top * z / (N + 1) - 0.5 * top * REBOUND * z)
-        assert -rolled(wheels, z, 0.0, SLIPPERY)[0] == pytest.approx(wanted, rel=0.015)
-
-
 # -- the second pass --------------------------------------------------------------------------------------------------
 TRAIN = 110  #: cells, of 3 cm
 

@@ -110,8 +110,6 @@ CASES: dict[str, Callable[[], eg.Model]] = {
     "driven chain": driven,
     "slider-crank": lambda: eg.load(EXAMPLES / "slider_crank.yaml"),
 }
-
-
 ALWAYS_IN_C = {"spatial chain"}
 
 

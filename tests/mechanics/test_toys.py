@@ -38,8 +38,6 @@ GAPS = np.array([L_M + L_G - L_S - R_0, R_M - R_0, R_M - R_0])
 NORMALS = np.array([[0, 0, -H_S], [0, H_M, 0], [0, -H_M, 0]])
 SLIDES = np.array([[1, L_M, L_G - L_S], [1, R_M, 0], [1, R_M, 0]])
 SMALL = 0.001  #: radius of what stands for a corner (m)
-
-
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "woodpecker_baumann_nuetzi.json").read_text("utf-8"))
 PUBLISHED = REFERENCE["published"]
 

@@ -454,19 +454,6 @@ def test_newton_and_euler(method: str) -> None:
     assert pressed > 4
 
 
-@pytest.mark.thorough
-def test_it_is_written_again_and_verified(tmp_path: Path) -> None:
-    file = tmp_path / "craft.yaml"
-    m = craft(", in=a.c")
-    m.initial(fly_z=0.15, glide_x=0.3)
-    file.write_text(m.to_yaml())
-    mod, again = m.compile(target="numpy"), eg.load(file).compile(target="numpy")
-    x = mod.x0()
-    assert np.array_equal(mod.outputs(0.0, x), again.outputs(0.0, x))
-    report = mod.verify()
-    assert report.ok, report
-
-
 @pytest.mark.parametrize(
     ("text", "told"),
     [

@@ -244,8 +244,6 @@ FOUR_BAR = f"""<robot name="four_bar"><link name="base"/><link name="a">{INERTIA
 <joint name="j2" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0.2 0 0"/><axis xyz="0 0 1"/></joint>
 <joint name="j3" type="continuous"><parent link="base"/><child link="c"/><origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
 </joint>{{}}</robot>"""
-
-
 REFUSED = [
     ('<loop_joint name="l" type="floating"><link1 link="b"/><link2 link="c"/></loop_joint>', "EG-CHOICE"),
     ('<loop_joint name="l" type="fixed"><link1 link="b"/></loop_joint>', "EG-MISSING loop_joint.l.link2:"),
@@ -265,8 +263,6 @@ STRANGE = """<robot name="strange" mood="sad"><link name="base"/><wheel size="3"
 <joint name="j" type="revolute"><parent link="base"/><child link="b"/><dynamics damping="1" spring_stiffness="4"/>
   <safety_controller k_velocity="1"/><magic/></joint>
 <transmission name="t"/><gazebo><gravity>0</gravity></gazebo></robot>"""
-
-
 DRIVES = (
     "left out: drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor) (<transmission>)"
 )

@@ -574,8 +574,6 @@ REFUSED: dict[tuple[str, str], str] = {
     ("driven", "linear"): "EG-JUMP jumps",
     ("driven", "function"): "needs its rate u_dot",
 }
-
-
 #: Calls at one state, which take values of inputs.
 AT_ONE_STATE = ("linearize", "minimal", "reactions", "equilibrium", "casadi", "fmu")
 #: Dear ones: stiff contacts in Python, and builds in C.

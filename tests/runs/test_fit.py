@@ -33,8 +33,6 @@ def arm(**values: Any) -> eg.Model:
 
 
 START = {"a": 0.6, "b": -0.9}
-
-
 DRIVE = {"tau": "4*sin(5*t) + 3*sin(2.3*t)"}
 
 

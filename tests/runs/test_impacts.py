@@ -302,20 +302,14 @@ def test_a_locked_joint_is_a_weld_in_impacts_with_friction() -> None:
 
 
 TEN, SPEED = 10.0, 0.5
-
-
 WAYS: dict[str, Any] = {
     "text": "0.5*t",
     "line": ([0.0, 2.0], [0.0, 1.0]),
     "bent": ([-1.0, 0.0, 2.0], [0.0, 0.0, 1.0]),
     "spline": eg.Signal([0.0, 0.2, 0.6], [0.0, 0.1, 0.3], "cubic"),
 }
-
-
 #: The ball meets the floor where 1 - g t^2/2 = w t.
 HIT = (-SPEED + np.sqrt(SPEED**2 + 2.0 * TEN)) / TEN
-
-
 AFTER = 2.0 * SPEED + TEN * HIT
 
 

@@ -299,8 +299,6 @@ FORCES = {
     ),
     "time": ("sin(2*t)*x - t*v/5 - x", lambda m, x, v, t: m.sin(2 * t) * x - t * v / 5 - x),
 }  # fmt: skip
-
-
 A, B = 0.75, -1.5  #: parameters a and b
 COLUMNS = list(FORCES)
 ALWAYS = ("products", "quotients", "sin, cos", "atan2", "real powers", "powers through 0", "multiples squared", "time")

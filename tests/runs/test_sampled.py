@@ -14,14 +14,8 @@ from sweeps import TARGETS
 import eomgen as eg
 
 MASS, TARGET = 2.0, 0.1
-
-
 GAINS = {"kp": 8.0, "ki": 5.0, "kd": 4.0}
-
-
 LAW = {"z": "z + T*(target - s)", "u": "kp*(target - s) + ki*z - kd*s_dot"}
-
-
 TEXT = """
 name: servo
 parameters: {T: {value: 100, unit: ms}, first: 0, kp: 8, ki: 5, kd: 4}

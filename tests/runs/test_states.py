@@ -35,8 +35,6 @@ def servo() -> Any:
 
 
 A = np.array([[0, 1, 0, 0], [-KP / M, 0, KI / M, -C / M], [-1, 0, 0, 0], [0, 1 / TAU, 0, -1 / TAU]])
-
-
 B = np.array([[0, 0], [KP / M, 1 / M], [1, 0], [0, 0]])
 
 
@@ -104,21 +102,15 @@ def sledge() -> eg.Model:
 FAULTS: dict[str, tuple[Callable[[eg.Model], object], str]] = {
     "no equation": (lambda m: m.state("a"), "EG-MISSING states.a.rate:"),
     "name of a parameter": (lambda m: m.state("tau", "1"), "EG-NAME-TAKEN states.tau: parameters.tau"),
-    "its rate is a name": (
-        lambda m: (m.input("a_dot"), m.state("a", 1)),
-        "EG-NAME-TAKEN states.a: 'a_dot' inputs.a_dot",
-    ),
+    "rate is a name": (lambda m: (m.input("a_dot"), m.state("a", 1)), "EG-NAME-TAKEN states.a: 'a_dot' inputs.a_dot"),
     "unknown name": (lambda m: m.state("a", "s/tua"), "EG-NAME-UNKNOWN states.a.rate: 'tau'?"),
     "acceleration": (lambda m: m.state("a", "s_ddot"), "EG-REFERENCE states.a.rate: 's_ddot'"),
     "its own rate": (lambda m: m.state("a", "-a_dot"), "EG-REFERENCE states.a.rate: 'a_dot'"),
     "in a driver": (lambda m: (m.state("a", 1), m.driver("d", "s", "a")), "EG-REFERENCE constraints.d.value: 'a'"),
     "in a mass": (lambda m: (m.state("a", 1), m.body("c", mass="a")), "EG-REFERENCE bodies.c.mass: 'a'"),
     "initial of a stranger": (lambda m: (m.state("act", 1), m.initial(atc=0)), "EG-NAME-UNKNOWN initial.atc: 'act'?"),
-    "rate in an event": (
-        lambda m: (m.state("a", 1), m.event("e", "a_dot")),
-        "EG-REFERENCE events.e.expression: 'a_dot'",
-    ),
-}
+    "rate in event": (lambda m: (m.state("a", 1), m.event("e", "a_dot")), "EG-REFERENCE events.e.expression: 'a_dot'"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", FAULTS)
@@ -370,15 +362,6 @@ def test_sensitivities_go_through_resets_of_states() -> None:
     for by, (ahead, behind) in ends.items():
         slope = (ahead - behind) / (2 * h)
         np.testing.assert_allclose([found[name, by][-1] for name in ("s", "s_dot", "a")], slope, atol=2e-5)
-
-
-def test_many_runs_are_single_runs() -> None:
-    mod = lag_module(events=True)
-    taus, starts = np.array([0.4, 0.5, 0.6, 0.7, 0.9]), np.array([0.1, 0.2, 0.3, 0.05, 0.0])
-    many = mod.simulate_many(3.0, parameters={"tau": taus}, initial={"a": starts})
-    for k, (tau, a) in enumerate(zip(taus, starts, strict=True)):
-        single = mod.simulate(3.0, parameters={"tau": tau}, initial={"a": a}).x[:, -1]
-        np.testing.assert_allclose(many.x[:, k], single, rtol=0.0, atol=1e-8)
 
 
 def test_a_driven_mechanism_integrates_its_states() -> None:
