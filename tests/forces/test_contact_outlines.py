@@ -8,7 +8,8 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import LAW, PLANAR, on
-from force_judges import differences, read_back
+from force_judges import read_back
+from judges import differences
 from refusals import refuses
 from sweeps import part_of
 

@@ -7,7 +7,8 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, check_slopes, depth_of, flying, near, on, state
-from force_judges import differences, read_back
+from force_judges import read_back
+from judges import differences
 from refusals import refuses
 from scipy.integrate import quad
 from scipy.optimize import minimize

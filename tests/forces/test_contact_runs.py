@@ -9,7 +9,7 @@ import contact_scenes as scenes
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, LAW, PLANAR, flying, on
-from force_judges import differences
+from judges import differences
 from models import IN_C
 from refusals import refuses
 from scipy.integrate import solve_ivp

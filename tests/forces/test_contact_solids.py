@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from contact_scenes import ELASTIC, STIFF, check_slopes, depth_of, flying, near, state
-from force_judges import differences
+from judges import differences
 from models import IN_C
 from mujoco_judge import EDGE, ROUNDED, Distances
 from refusals import refuses

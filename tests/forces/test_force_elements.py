@@ -629,5 +629,5 @@ def test_all_elements_on_a_closed_loop() -> None:
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
         np.testing.assert_allclose(modules[0].energy(x), modules[1].energy(x), rtol=1e-12)
         for mod in modules:
-            slopes = bench.fine_differences(mod, x, 2e-5, 0.2)
+            slopes = judges.fine_differences(mod, x, 2e-5, 0.2)
             assert np.abs(mod.jacobian(0.2, x) - slopes).max() <= 1e-6 * np.abs(slopes).max()

@@ -7,7 +7,8 @@ import force_judges as bench
 import judges
 import numpy as np
 import pytest
-from force_judges import Seen, Wrench, differences, problems
+from force_judges import Seen, Wrench, problems
+from judges import differences
 from refusals import refuses
 from scipy.optimize import minimize
 from sweeps import TARGETS
@@ -143,7 +144,7 @@ def test_loads_of_a_wrapped_path_by_virtual_work(sense: str, tmp_path: Path) -> 
         for mod in (embedded, lagrange):
             found = bare.bias(0.0, x) - mod.bias(0.0, x)
             assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
-            slopes = bench.fine_differences(mod, x, 1e-5)
+            slopes = judges.fine_differences(mod, x, 1e-5)
             assert np.abs(mod.jacobian(0.0, x) - slopes).max() <= 1e-6 * np.abs(slopes).max()
     assert 2 <= wrapped <= 11
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from force_judges import differences, read_back
+from force_judges import read_back
+from judges import differences
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 from sweeps import TARGETS

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from force_judges import differences
+from force_judges import wong
+from judges import differences
 from refusals import refuses
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -40,13 +41,6 @@ def plate(law: dict[str, Any], mass: Any = 100.0, sizes: Any = (0.5, 0.3), groun
     shape = {"shape": "plate", "on": body, "length": sizes[0], "width": sizes[1], **more}
     m.contacts("soil", shape, ground or {"shape": "half_plane", "on": m.ground}, law)
     return m
-
-
-def wong(z: Any, deepest: Any, k: float, n: float, rebound: float = 0.1) -> Any:
-    """Pressure at a sinkage below the greatest one so far."""
-    most = np.maximum(z, deepest)
-    top = k * most**n
-    return np.maximum(top - top / (rebound * most) * (most - z), 0.0)
 
 
 def test_table_of_soils_in_imperial_units() -> None:

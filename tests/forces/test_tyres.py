@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from force_judges import differences
+from judges import differences
 from refusals import refused, refuses
 from scipy.integrate import quad
 from scipy.optimize import brentq

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from judges import differences
 from model_files import load
 from models import IN_C
 from refusals import refuses
@@ -208,12 +209,6 @@ def extended(mod: Any, x: np.ndarray) -> np.ndarray:
     return np.array([known.get(names.get(name, name), 0.0) for name in other.x_names])
 
 
-def differences(mod: Any, x: np.ndarray, t: float = 0.1) -> np.ndarray:
-    h = 1e-6
-    columns = [(mod.rhs(t, x + h * e) - mod.rhs(t, x - h * e)) / (2 * h) for e in np.eye(len(x))]
-    return np.array(columns).T
-
-
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_loop_with_states_moves_as_one_with_bodies_in_their_place(target: str) -> None:
     mod, other = crank_module(target), crank_module("numpy", states=False)
@@ -225,7 +220,7 @@ def test_a_loop_with_states_moves_as_one_with_bodies_in_their_place(target: str)
         for name, value in wanted.items():
             if name not in ("qf", "qd"):
                 assert found[names.get(name, name)] == pytest.approx(value, rel=1e-10, abs=1e-10)
-        np.testing.assert_allclose(mod.jacobian(0.1, x), differences(mod, x), rtol=1e-5, atol=2e-4)
+        np.testing.assert_allclose(mod.jacobian(0.1, x), differences(mod, x, 1e-6, 0.1), rtol=1e-5, atol=2e-4)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -259,12 +254,8 @@ def test_runs_equilibria_and_minimal_form_of_a_loop() -> None:
     x = minimal.x0(theta=0.3)
     assert minimal.x_names == ("theta", "theta_dot", "f", "d")
     np.testing.assert_allclose(minimal.rhs(0.0, x), mod.rhs(0.0, minimal.expand(x))[[0, 3, 6, 7]], rtol=1e-12)
-    h = 1e-6
-    reduced = []
     start = minimal.x0(**{name: rest[name] for name in ("theta", "f", "d")}, theta_dot=0.0)
-    for e in np.eye(4):
-        reduced.append((minimal.rhs(0.0, start + h * e) - minimal.rhs(0.0, start - h * e)) / (2 * h))
-    np.testing.assert_allclose(np.array(reduced).T, linear.A, rtol=1e-5, atol=1e-4)
+    np.testing.assert_allclose(differences(minimal, start, 1e-6), linear.A, rtol=1e-5, atol=1e-4)
 
 
 @pytest.mark.parametrize("method", ["lagrange", "recursive", "augmented", "hamilton"])
