@@ -239,10 +239,15 @@ def agree(a: np.ndarray, b: np.ndarray, digits: float, cond: float = 1.0) -> Non
     assert worst <= allowed, f"differ by {worst:.3g}, allowed {allowed:.3g}\n{a}\n{b}"
 
 
-def differences(mod: Any, x: np.ndarray, step: Any = 1e-7, t: float = 0.0) -> np.ndarray:
-    """The Jacobian of rhs by central differences; ``step`` is one number, or one of each state."""
+def slopes(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, step: Any = 1e-6) -> np.ndarray:
+    """Derivatives of a function by central differences; ``step`` is one number, or one of each variable."""
     steps = np.diag(np.broadcast_to(step, len(x)))
-    return np.array([(mod.rhs(t, x + d) - mod.rhs(t, x - d)) / (2 * d.sum()) for d in steps]).T
+    return np.array([(f(x + d) - f(x - d)) / (2 * d.sum()) for d in steps]).T
+
+
+def differences(mod: Any, x: np.ndarray, step: Any = 1e-7, t: float = 0.0) -> np.ndarray:
+    """The Jacobian of rhs by central differences."""
+    return slopes(lambda y: mod.rhs(t, y), x, step)
 
 
 def fine_differences(mod: Any, x: np.ndarray, step: float, t: float = 0.0) -> np.ndarray:

@@ -12,6 +12,7 @@ import command
 import pytest
 from attack.nasty_texts import NASTY
 from attack.yaml_files import at, paths
+from model_files import load
 from ruamel.yaml import YAML
 
 import eomgen as eg
@@ -80,20 +81,15 @@ def changed(data: Any, place: tuple[Any, ...], text: str, is_key: bool) -> Any:
     return data
 
 
-def load(data: Any, folder: Path) -> eg.Model:
-    (folder / "model.yaml").write_text(json.dumps(data))
-    return eg.load(folder / "model.yaml")
-
-
 @pytest.mark.parametrize("every", [44, pytest.param(6, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("name", [pytest.param("bare", marks=pytest.mark.quick), "given", "held", "mechanism"])
 def test_a_nasty_text_is_refused_by_name(name: str, every: int, tmp_path: Path) -> None:
     """A few of the texts in each place, the next in the next."""
-    assert load(MODELS[name], tmp_path).mechanism().name == name
+    assert load(tmp_path, json.dumps(MODELS[name])).mechanism().name == name
     for number, (place, is_key) in enumerate(places(MODELS[name])):
         for text in [*NASTY.values()][number % every :: every]:
             with pytest.raises(eg.ModelError) as caught:
-                load(changed(MODELS[name], place, text, is_key), tmp_path).mechanism()
+                load(tmp_path, json.dumps(changed(MODELS[name], place, text, is_key))).mechanism()
             for problem in caught.value.problems:
                 assert str(problem).isprintable(), (place, text)
                 assert len(str(problem)) < 10_000

@@ -12,6 +12,7 @@ import pinocchio
 import pytest
 import rotations
 import sympy
+from analysed import rssr
 from models import IN_C, reference
 from numpy.typing import NDArray
 from refusals import refuses
@@ -574,20 +575,10 @@ def test_faults_of_descriptions(change: Any, fault: str) -> None:
     refuses(fault, m.check)
 
 
-def rssr(rotation: str) -> eg.Model:
-    m = eg.Model("rssr", gravity=(0, 0, -9.81))
-    crank = m.body("crank", mass=1.0, com=(0.05, 0, 0), inertia=(1e-3, 2e-3, 2e-3))
-    rod = m.body("rod", mass=0.7, com=(0.2, 0.01, 0), inertia=(1e-4, 3e-3, 3.1e-3))
-    rocker = m.body("rocker", mass=0.9, com=(0.1, 0, 0), inertia=(1e-3, 4e-3, 4e-3))
-    m.revolute("A", m.ground, crank, coordinate="th")
-    m.spherical("S", crank.at(0.1, 0, 0), rod, rotation=rotation)
-    m.revolute("D", m.ground.at(0.4, 0.1, 0.05), rocker, axis="y", coordinate="ph")
-    m.spherical("T", rod.at(0.4, 0, 0), rocker.at(0.25, 0, 0), rotation=rotation)
-    m.initial(th=0.3, th_dot=5.0)
-    m.damper("d", m.ground.at(0.1, 0.1, 0.1), rod.at(0.3, 0, 0), damping=0.4)
+def loop(rotation: str) -> eg.Model:
+    m = rssr(rotation)
     for k, axis in enumerate("xyz"):
-        point = rod.at(0.2, 0.1, 0.05)
-        m.output(f"a{axis}", point.acceleration[k])
+        m.output(f"a{axis}", m.bodies["rod"].at(0.2, 0.1, 0.05).acceleration[k])
     return m
 
 
@@ -611,8 +602,8 @@ def as_parameters(angles: Any, parameters: Any, x: np.ndarray) -> np.ndarray:
 
 def test_loops_in_parameters_are_those_in_angles() -> None:
     """Outputs, energies and runs agree; accelerations are those of multipliers, the Jacobian that of differences."""
-    angles, parameters = (rssr(kind).compile(target="numpy") for kind in ("euler_angles", "euler_parameters"))
-    by_lagrange = rssr("euler_parameters").compile("lagrange", target="numpy", kernels=["rhs"])
+    angles, parameters = (loop(kind).compile(target="numpy") for kind in ("euler_angles", "euler_parameters"))
+    by_lagrange = loop("euler_parameters").compile("lagrange", target="numpy", kernels=["rhs"])
     n = parameters.n_q
     for th, spin in ((0.3, 0.0), (-0.4, -3.0)):
         x = angles.x0(th=th, th_dot=5.0, S_1_dot=spin)

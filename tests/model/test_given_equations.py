@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import command
+import judges
 import matplotlib
 import numpy as np
 import pytest
@@ -20,10 +21,6 @@ TARGETS = ["numpy", pytest.param("cython", marks=pytest.mark.thorough)]
 
 def given(name: str, parameters: Any = (), **equations: Any) -> eg.Model:
     return eg.Model.from_equations(name, **equations, parameters={"w": 1.3, **dict(parameters)})
-
-
-def slopes(call: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
-    return np.array([(call(x + h * e) - call(x - h * e)) / (2 * h) for e in np.eye(len(x))]).T
 
 
 def tied(**more: Any) -> eg.Model:
@@ -67,7 +64,7 @@ def test_constraints_with_given_rates(target: str) -> None:
     f = np.array([-4 * a - u * v, -b + s * z, np.sin(t) - c, -0.1 * z + u * s])
     solved = np.linalg.solve(np.block([[M, C_q.T], [C_q, np.zeros((2, 2))]]), np.concatenate([f, -gamma]))
     assert x_dot[3:] == pytest.approx(solved[:4], abs=1e-9)
-    assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
+    assert module.jacobian(t, x) == pytest.approx(judges.differences(module, x, 1e-6, t), abs=1e-8)
     run = module.simulate((0.0, 0.5), initial={"a": 0.3, "c": 0.2, "r": 0.5})
     assert run["a_dot"] == pytest.approx(1.3 * np.cos(run["c"]) * run["r"] + 0.1 * np.sin(run.t))
     assert run.residuals.raw_position < 1e-8
@@ -115,7 +112,7 @@ def test_speeds_and_coordinates_that_differ_in_number(n: int, k: int, blade: boo
         push = np.linalg.solve(M, row)
         a -= push * (row @ a + 0.5 * s[0] * np.sin(p[0]) * q_dot[0]) / (row @ push)
     assert module.rhs(t, x) == pytest.approx(np.concatenate([q_dot, a]), abs=1e-12)
-    assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
+    assert module.jacobian(t, x) == pytest.approx(judges.differences(module, x, 1e-6, t), abs=1e-8)
     assert len(module.branches(q0=0.2)) == 1
     assert module.assemble(q0=0.2)[0] == 0.2
     start = dict(zip(module.x_names, x, strict=True))

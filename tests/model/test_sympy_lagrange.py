@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import judges
 import numpy as np
 import pytest
 import sympy
@@ -258,12 +259,6 @@ def state_matrix(v: float) -> np.ndarray:
     ])  # fmt: skip
 
 
-def slopes(call: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
-    """Derivative of a function of the state by central differences."""
-    columns = [(call(x + h * e) - call(x - h * e)) / (2 * h) for e in np.eye(len(x))]
-    return np.array(columns).T
-
-
 #: SymPy 1.14, test_kane5.py: q, independent u -> q' and u' at g = 9.81, r = 0.26, m = 3.43
 DISC = [
     (
@@ -300,7 +295,7 @@ def test_rolling_disc(disc: eg.Model, target: str) -> None:
         names = ("q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3")
         x = module.x0(**dict(zip(names, given, strict=True)))
         assert module.rhs(0.0, x) == pytest.approx(expected, abs=1e-10)
-        assert np.abs(module.jacobian(0.0, x) - slopes(lambda z: module.rhs(0.0, z), x)).max() < 1e-7
+        assert np.abs(module.jacobian(0.0, x) - judges.differences(module, x, 1e-6)).max() < 1e-7
         assert module.mass_matrix(x[:5]).shape == (5, 5)
         assert module.bias(0.0, x).shape == (5,)
         assert np.abs(module.velocity_constraints(x)).max() < 1e-13
@@ -337,7 +332,7 @@ def test_bicycle(whipple: eg.Model, target: str) -> None:
         for value in expected:
             assert np.abs(found - value).min() < 1e-7
         # SymPy, test_kane3.py: the same in independent coordinates, the others following the constraints
-        tangent = slopes(module.project, x, 1e-5)
+        tangent = judges.slopes(module.project, x, 1e-5)
         free = [module.x_names.index(name) for name in ("q1", "q2", "q5", "u2", "u3", "u5")]
         basis = np.linalg.svd(tangent)[0][:, :6]
         basis = basis @ np.linalg.inv(basis[free])

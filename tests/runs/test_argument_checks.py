@@ -162,16 +162,29 @@ def test_what_is_missing_and_what_takes_no_result(target: str) -> None:
 
 #: Each is 0.5.
 NUMBERS: dict[str, Any] = {
-    "float": 0.5, "long": np.longdouble(0.5), "other bytes": np.array(0.5, dtype=">f8"), "fraction": Fraction(1, 2),
-    "decimal": Decimal("0.5"), "sympy": sympy.Rational(1, 2), "object": np.array(sympy.Float(0.5), dtype=object),
+    "float": 0.5,
+    "long": np.longdouble(0.5),
+    "other bytes": np.array(0.5, dtype=">f8"),
+    "fraction": Fraction(1, 2),
+    "decimal": Decimal("0.5"),
+    "sympy": sympy.Rational(1, 2),
+    "object": np.array(sympy.Float(0.5), dtype=object),
     "nothing masked": np.ma.masked_array(0.5, mask=False),
-}  # fmt: skip
+}
 UNREAL: dict[str, Any] = {
-    "text": "0.5", "bytes": b"0.5", "text as an object": np.array("0.5", dtype=object), "complex": 0.5 + 0j,
-    "complex of SymPy": sympy.I, "symbol": sympy.Symbol("q"), "nanoseconds": np.timedelta64(1, "ns"),
-    "masked": np.ma.masked_array(0.5, mask=True), "huge": 10**400, "set": {0.5}, "dictionary": {"theta": 0.5},
+    "text": "0.5",
+    "bytes": b"0.5",
+    "text as an object": np.array("0.5", dtype=object),
+    "complex": 0.5 + 0j,
+    "complex of SymPy": sympy.I,
+    "symbol": sympy.Symbol("q"),
+    "nanoseconds": np.timedelta64(1, "ns"),
+    "masked": np.ma.masked_array(0.5, mask=True),
+    "huge": 10**400,
+    "set": {0.5},
+    "dictionary": {"theta": 0.5},
     "type": float,
-}  # fmt: skip
+}
 
 
 def column(value: Any, n: int) -> Any:
