@@ -69,8 +69,8 @@ def top(rotation: str) -> eg.Model:
     return m
 
 
-def rssr() -> eg.Model:
-    """Spatial four-bar with a rod on two ball joints, one of them in Euler parameters, which keeps its spin free."""
+def rssr(rotation: str = "euler_parameters") -> eg.Model:
+    """Spatial four-bar with a rod on two ball joints, which keeps its spin free."""
     m = eg.Model("rssr", gravity=(0, 0, "-g"))
     m.parameter("g", 9.81)
     r, l = m.parameter("r", 0.1), m.parameter("l", 0.4)
@@ -78,9 +78,9 @@ def rssr() -> eg.Model:
     rod = m.body("rod", mass=0.7, com=(l / 2, 0.01, 0), inertia=(1e-4, 3e-3, 3.1e-3))
     rocker = m.body("rocker", mass=0.9, com=(0.1, 0, 0), inertia=(1e-3, 4e-3, 4e-3))
     m.revolute("A", m.ground, crank, coordinate="th")
-    m.spherical("S", crank.at(r, 0, 0), rod, rotation="euler_parameters")
+    m.spherical("S", crank.at(r, 0, 0), rod, rotation=rotation)
     m.revolute("D", m.ground.at(0.4, 0.1, 0.05), rocker, axis="y", coordinate="ph")
-    m.spherical("T", rod.at(l, 0, 0), rocker.at(0.25, 0, 0), rotation="euler_parameters")
+    m.spherical("T", rod.at(l, 0, 0), rocker.at(0.25, 0, 0), rotation=rotation)
     m.torque("motor", "A", m.input("tau", 0.2))
     m.damper("d", m.ground.at(0.1, 0.1, 0.1), rod.at(0.3, 0, 0), damping=0.4)
     m.output("height", rod.at(0.2, 0, 0).position[2])

@@ -1,4 +1,4 @@
-"""Scenes of contact between groups, and their geometry in NumPy."""
+"""Scenes of contact between groups in the plane and in space, their geometry in NumPy, and judges of their energy."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 import eomgen as eg
 
 LAW = {"stiffness": 2e4, "dissipation": 0.2, "friction": 0.3, "smoothing": 0.01}
-ELASTIC = {"stiffness": 2e4}
+STIFF = 2e4
+ELASTIC = {"stiffness": STIFF}
 TRIANGLE = ((0.12, 0.01), (-0.1, 0.1), (-0.08, -0.1))
 #: Shapes in the plane, in body axes.
 PLANAR: dict[str, dict[str, Any]] = {
@@ -354,3 +355,44 @@ def turned(module: Any, one: Shot, method: str) -> float:
     free = np.array([one.start["j_x_dot"], one.start["j_y_dot"] - one.parameters["g"] * one.end])
     speed = max(np.hypot(one.start["j_x_dot"], one.start["j_y_dot"]), np.hypot(*free))
     return float(np.hypot(*(end - free)) / speed)
+
+
+# -- Free bodies in space ----------------------------------------------------------------------------------------------
+def flying(count: int, gravity: Any = (0, 0, 0)) -> tuple[eg.Model, list[Any]]:
+    m = eg.Model("flying", gravity=gravity)
+    bodies = [m.body(f"b{k}", mass=1.0 + k, inertia=(0.01, 0.012, 0.015)) for k in range(count)]
+    for k, body in enumerate(bodies):
+        m.free(f"j{k}", m.ground, body, rotation="euler_parameters")
+    return m, bodies
+
+
+def state(mod: Any, places: Any, turns: Any) -> np.ndarray:
+    """A state at rest with bodies at places, turned."""
+    found = np.zeros(mod.n_x)
+    for k, (place, turn) in enumerate(zip(places, turns, strict=True)):
+        x, y, z, w = turn.as_quat()
+        own = [i for i, name in enumerate(mod.q_names) if name.startswith(f"j{k}_")]
+        found[own] = [*place, w, x, y, z]
+    return found
+
+
+def moved(mod: Any, x: np.ndarray, k: int, h: float) -> np.ndarray:
+    """The state after the velocity of one number has acted for a short time."""
+    v = np.zeros(mod.n_v)
+    v[k] = 1.0
+    speeds = np.concatenate([x[: mod.n_q], v])
+    rate = mod.rhs(0.0, speeds)[: mod.n_q]
+    return np.asarray(mod.project(np.concatenate([x[: mod.n_q] + h * rate, np.zeros(mod.n_v)])))
+
+
+def check_slopes(mod: Any, x: np.ndarray) -> None:
+    """The generalized forces are minus the slopes of the energy along the velocities."""
+    h = 1e-6
+    sides = [moved(mod, x, k, way * h) for way in (1, -1) for k in range(mod.n_v)]
+    slopes = np.subtract(*mod.energy(np.array(sides).T)[1].reshape(2, -1)) / (2 * h)
+    force = -mod.bias(0.0, x)
+    np.testing.assert_allclose(force, np.negative(slopes), rtol=2e-4, atol=2e-4 * np.abs(force).max())
+
+
+def depth_of(mod: Any, x: np.ndarray) -> float:
+    return float((mod.energy(x)[1] * 2.5 / STIFF) ** 0.4)

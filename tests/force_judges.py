@@ -21,19 +21,6 @@ def problems(model: eg.Model) -> dict[str, str]:
     return {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
 
 
-def differences(mod: Any, x: np.ndarray, step: Any = 1e-7, t: float = 0.0) -> np.ndarray:
-    """The Jacobian of rhs by central differences; ``step`` is one number, or one of each state."""
-    steps = np.diag(np.broadcast_to(step, len(x)))
-    return np.array([(mod.rhs(t, x + d) - mod.rhs(t, x - d)) / (2 * d.sum()) for d in steps]).T
-
-
-def fine_differences(mod: Any, x: np.ndarray, step: float, t: float = 0.0) -> np.ndarray:
-    """The same to the tenth order, all at once."""
-    n, steps = len(x), step * np.kron(np.eye(len(x)), judges.OFFSETS)
-    sides = mod.rhs(t, x[:, None] + steps) - mod.rhs(t, x[:, None] - steps)
-    return np.asarray(sides.reshape(n, n, -1) @ judges.FIRST / step)
-
-
 def read_back(model: eg.Model, folder: Path) -> eg.Model:
     """The model that its file gives."""
     (folder / "written.yaml").write_text(model.to_yaml(), encoding="utf-8")
@@ -141,7 +128,7 @@ def judge(
             rate = judges.first(lambda c, mod=mod: np.sum(mod.energy(c), axis=0), x, mod.rhs(t, x), h=2e-4)
             given = power(bodies, wrenches if lost is None else lost(*markers, bodies, t))
             assert abs(rate - given) <= 1e-8 * max(1.0, abs(power(bodies, wrenches)), np.sum(mod.energy(x)))
-            slopes = fine_differences(mod, x, 1e-4, t)
+            slopes = judges.fine_differences(mod, x, 1e-4, t)
             assert np.abs(mod.jacobian(t, x) - slopes).max() <= 1e-7 * np.abs(slopes).max()
         np.testing.assert_array_equal(again.rhs(t, x), modules[0].rhs(t, x))
 
@@ -157,3 +144,11 @@ def states(seed: int, count: int, reach: float = 0.6, speed: float = 1.0, turn: 
         x[12:] *= speed / turn
         found.append(x)
     return found
+
+
+def wong(z: Any, deepest: Any, k: float, n: float, rebound: float = 0.1) -> Any:
+    """Pressure of soil at a depth below the greatest one so far; Wong's unloading and reloading by one line."""
+    z = np.maximum(z, 0.0)
+    most = np.maximum(np.maximum(z, deepest), 1e-12)
+    top = k * most**n
+    return np.where(z > 0, np.maximum(top - top / (rebound * most) * (most - z), 0.0), 0.0)

@@ -237,3 +237,21 @@ def agree(a: np.ndarray, b: np.ndarray, digits: float, cond: float = 1.0) -> Non
     allowed = digits * max(1.0, cond / 1e3) * np.abs(b).max(initial=0.0)
     worst = np.abs(a - b).max(initial=0.0)
     assert worst <= allowed, f"differ by {worst:.3g}, allowed {allowed:.3g}\n{a}\n{b}"
+
+
+def slopes(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, step: Any = 1e-6) -> np.ndarray:
+    """Derivatives of a function by central differences; ``step`` is one number, or one of each variable."""
+    steps = np.diag(np.broadcast_to(step, len(x)))
+    return np.array([(f(x + d) - f(x - d)) / (2 * d.sum()) for d in steps]).T
+
+
+def differences(mod: Any, x: np.ndarray, step: Any = 1e-7, t: float = 0.0) -> np.ndarray:
+    """The Jacobian of rhs by central differences."""
+    return slopes(lambda y: mod.rhs(t, y), x, step)
+
+
+def fine_differences(mod: Any, x: np.ndarray, step: float, t: float = 0.0) -> np.ndarray:
+    """The same to the tenth order, all at once."""
+    n, steps = len(x), step * np.kron(np.eye(len(x)), OFFSETS)
+    sides = mod.rhs(t, x[:, None] + steps) - mod.rhs(t, x[:, None] - steps)
+    return np.asarray(sides.reshape(n, n, -1) @ FIRST / step)

@@ -21,25 +21,16 @@ import eomgen as eg
 
 #: Elements and attributes that the words themselves use, and some more.
 _WORDS = {name: " ".join([*BASES[name], *PIECES[name]]) for name in BASES}
-TAGS = {
-    name: sorted({*re.findall(r"<([\w:]+)", text), "a:b", "robot", "mujoco", "Include"})
-    for name, text in _WORDS.items()
-}
+MORE_TAGS = {"a:b", "robot", "mujoco", "Include"}
+TAGS = {name: sorted({*re.findall(r"<([\w:]+)", text), *MORE_TAGS}) for name, text in _WORDS.items()}
 MORE = "fileup fileback nrow ncol width height content_type user nuser_body nkey class name plugin key value radius length".split()
 NAMES = {name: sorted({*re.findall(r" (\w+)=", text), *MORE}) for name, text in _WORDS.items()}
 
 OPTIONS: dict[str, tuple[Any, ...]] = {
-    "floating": (True,),
-    "mimic": ("coupling",),
-    "actuate": (True,),
-    "symbolic": (True,),
-    "friction": (0.01,),
-    "rotation": ("euler_parameters",),
-    "check_inertia": ("note", "off"),
-    "merge": (False,),
-    "lock": ({"j1": 0.2}, {"j2": 1e308}),
-    "gravity": ((0, 0, 1e308),),
-}
+    "floating": (True,), "mimic": ("coupling",), "actuate": (True,), "symbolic": (True,), "friction": (0.01,),
+    "rotation": ("euler_parameters",), "check_inertia": ("note", "off"), "merge": (False,),
+    "lock": ({"j1": 0.2}, {"j2": 1e308}), "gravity": ((0, 0, 1e308),),
+}  # fmt: skip
 SECRET = "SECRET"
 MASS = 12345.678  #: of the body that the secret file describes
 ENCODINGS = ("utf-16", "utf-32", "utf-8-sig", "utf-7", "cp1252", "latin-1")
@@ -115,9 +106,8 @@ class Meshes(Robots):
 
     def make(self, r: random.Random) -> dict[str, Any]:
         name = r.choice(sorted(MESHES)) if r.random() < 0.3 else "a.stl"
-        told = r.choice(
-            (name, name, name, name, "a\\0.stl", "\\uD800.stl", ".", "a.stl/", "A.STL", "x" * 300 + ".stl", "nul.stl")
-        )
+        odd = ("a\\0.stl", "\\uD800.stl", ".", "a.stl/", "A.STL", "x" * 300 + ".stl", "nul.stl")
+        told = r.choice((*(name,) * 4, *odd))
         files = {name: encoded(mesh(r, name)), "model.yaml": solid(told)}
         return {"files": files, "main": "model.yaml", "options": {}, "stage": r.choice(("load", "load", "check"))}
 
@@ -153,9 +143,8 @@ def stl(size: float, count: int | None = None) -> bytes:
 
 def mesh(r: random.Random, name: str) -> bytes:
     """The bytes of a mesh: sound, cut, changed, or telling of far more than there is."""
-    data = stl(
-        r.choice((1.0, 1e-30, 1e30, 3e38, 1e-6)), r.choice((None, None, None, 0, 1, 5, 2**31, 2**32 - 1, 100_000_000))
-    )
+    counts = (None, None, None, 0, 1, 5, 2**31, 2**32 - 1, 100_000_000)
+    data = stl(r.choice((1.0, 1e-30, 1e30, 3e38, 1e-6)), r.choice(counts))
     if not name.endswith(".stl") or r.random() < 0.4:
         data = MESHES.get(name, MESHES["text.stl"]).encode()
         for _ in range(r.choice((0, 1, 1, 3))):
@@ -232,13 +221,8 @@ def letters(text: str, r: random.Random) -> str | dict[str, str]:
     """A text with some of its letters changed."""
     k, at = r.randrange(9), r.randrange(len(text))
     if k == 0:
-        return (
-            text[:at]
-            + r.choice(
-                ("<", ">", "&", "&x;", "&#0;", "&#10;", '"', "\x00", "</a>", "<a>", "<?p ?>", "]]>", "\x0b", "\ud800")
-            )
-            + text[at:]
-        )
+        marks = ("<", ">", "&", "&x;", "&#0;", "&#10;", '"', "\x00", "</a>", "<a>", "<?p ?>", "]]>", "\x0b", "\ud800")
+        return text[:at] + r.choice(marks) + text[at:]
     if k == 1:
         return r.choice(DECLARATIONS) + text
     if k == 2:

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 from xml.sax import saxutils
@@ -10,109 +11,87 @@ from xml.sax import saxutils
 import command
 import pytest
 from attack.nasty_texts import NASTY
+from attack.yaml_files import at, paths
+from model_files import load
+from ruamel.yaml import YAML
 
 import eomgen as eg
 
 #: Models that together have every section of a file.
-MODELS: dict[str, Any] = {
-    "held": {
-        "name": "held",
-        "gravity": [0, "-9.81", 0],
-        "parameters": {"l": {"value": 0.5, "unit": "m"}},
-        "inputs": {"tau": {"value": 0.0, "unit": "N*m"}},
-        "bodies": {
-            "rod": {
-                "mass": 1.0,
-                "com": ["l/2", 0, 0],
-                "inertia": {"zz": 0.1},
-                "markers": {"tip": {"at": ["l", 0, 0]}},
-                "display": [{"shape": "box", "size": [1, 1, 1]}],
-            }
-        },
-        "joints": {"A": {"type": "revolute", "between": ["ground", "rod"], "coordinate": "theta", "axis": "z"}},
-        "forces": {"motor": {"type": "torque", "joint": "A", "value": "tau"}},
-        "states": {"z": {"rate": "-z"}},
-        "outputs": {"y": {"expression": "y(rod.tip)", "unit": "m"}},
-        "events": {"low": {"expression": "y(rod.tip)"}},
-        "initial": {"theta": 0.3},
-        "simulation": {"end": 1, "method": "DOP853"},
-    },
-    "mechanism": {
-        "name": "mechanism",
-        "parameters": {"m": 1.0},
-        "functions": {"f": {"type": "table", "x": [0, 1, 2], "y": [0, 1, 4], "kind": "cubic"}},
-        "bodies": {
-            "a": {"mass": "m", "inertia": [1, 1, 1]},
-            "b": {"mass": "m", "points": [{"mass": 1, "at": [1, 0, 0]}]},
-        },
-        "joints": {
-            "A": {"type": "revolute", "between": ["ground", "a"], "limits": {"lower": -1}},
-            "B": {"type": "cylindrical", "between": [{"body": "a", "at": [1, 0, 0]}, "b"], "coordinates": ["s", "w"]},
-        },
-        "forces": {"k": {"type": "spring", "between": ["ground", "b"], "stiffness": "f(m)"}},
-        "constraints": {"c": {"type": "coupling", "coordinates": {"A": 1, "w": 2}}},
-        "events": {"e": {"expression": "A", "reset": {"A_dot": "-A_dot"}, "terminal": 2}},
-        "guess": {"A": 0.1},
-        "independent": ["A", "s"],
-    },
-    "bare": {
-        "name": "bare",
-        "parameters": {"k": 1.0},
-        "lagrangian": {"coordinates": ["a", "b"], "expression": "a_dot**2 + b_dot**2 - k*a", "forces": {"a": "k"}},
-    },
-    "given": {
-        "name": "given",
-        "equations": {
-            "coordinates": ["q"],
-            "velocities": ["v"],
-            "rates": {"q": "v"},
-            "intermediates": {"z": "q**2"},
-            "mass_matrix": [[1]],
-            "forcing": ["-z"],
-        },
-    },
-}
+TEXTS = """
+name: held
+gravity: [0, "-9.81", 0]
+parameters: {l: {value: 0.5, unit: m}}
+inputs: {tau: {value: 0.0, unit: N*m}}
+bodies:
+  rod: {mass: 1.0, com: [l/2, 0, 0], inertia: {zz: 0.1}, markers: {tip: {at: [l, 0, 0]}},
+    display: [{shape: box, size: [1, 1, 1]}]}
+joints: {A: {type: revolute, between: [ground, rod], coordinate: theta, axis: z}}
+forces: {motor: {type: torque, joint: A, value: tau}}
+states: {z: {rate: -z}}
+outputs: {y: {expression: y(rod.tip), unit: m}}
+events: {low: {expression: y(rod.tip)}}
+initial: {theta: 0.3}
+simulation: {end: 1, method: DOP853}
+---
+name: mechanism
+parameters: {m: 1.0}
+functions: {f: {type: table, x: [0, 1, 2], y: [0, 1, 4], kind: cubic}}
+bodies:
+  a: {mass: m, inertia: [1, 1, 1]}
+  b: {mass: m, points: [{mass: 1, at: [1, 0, 0]}]}
+joints:
+  A: {type: revolute, between: [ground, a], limits: {lower: -1}}
+  B: {type: cylindrical, between: [{body: a, at: [1, 0, 0]}, b], coordinates: [s, w]}
+forces: {k: {type: spring, between: [ground, b], stiffness: f(m)}}
+constraints: {c: {type: coupling, coordinates: {A: 1, w: 2}}}
+events: {e: {expression: A, reset: {A_dot: -A_dot}, terminal: 2}}
+guess: {A: 0.1}
+independent: [A, s]
+---
+name: bare
+parameters: {k: 1.0}
+lagrangian: {coordinates: [a, b], expression: a_dot**2 + b_dot**2 - k*a, forces: {a: k}}
+---
+name: given
+equations: {coordinates: [q], velocities: [v], rates: {q: v}, intermediates: {z: q**2}, mass_matrix: [[1]], forcing: [-z]}
+"""
+MODELS: dict[str, Any] = {data["name"]: data for data in YAML(typ="safe", pure=True).load_all(TEXTS)}
 
 
-def paths(value: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], bool]]:
+def places(data: Any) -> Iterator[tuple[tuple[Any, ...], bool]]:
     """Places of all values, and of all keys, of a model file's data."""
-    if isinstance(value, dict | list):
-        for key, part in value.items() if isinstance(value, dict) else enumerate(value):
-            if isinstance(value, dict):
-                yield (*at, key), True
-            yield from paths(part, (*at, key))
-    else:
-        yield at, False
+    for place in [*paths(data)][1:]:
+        if isinstance(at(data, place[:-1]), dict):
+            yield place, True
+        if not isinstance(at(data, place), dict | list):
+            yield place, False
 
 
-def changed(value: Any, at: tuple[Any, ...], text: str, is_key: bool) -> Any:
+def changed(data: Any, place: tuple[Any, ...], text: str, is_key: bool) -> Any:
     """The data with a text in place of one value or key."""
-    head, rest = at[0], at[1:]
-    if isinstance(value, list):
-        return [
-            (changed(part, rest, text, is_key) if rest else text) if k == head else part for k, part in enumerate(value)
-        ]
-    if rest:
-        return {k: changed(part, rest, text, is_key) if k == head else part for k, part in value.items()}
-    return {text if is_key and k == head else k: text if k == head and not is_key else v for k, v in value.items()}
-
-
-def load(data: Any, folder: Path) -> eg.Model:
-    (folder / "model.yaml").write_text(json.dumps(data))
-    return eg.load(folder / "model.yaml")
+    data, last = deepcopy(data), place[-1]
+    holder = at(data, place[:-1])
+    if is_key:
+        items = [(text if key == last else key, value) for key, value in holder.items()]
+        holder.clear()
+        holder.update(items)
+    else:
+        holder[last] = text
+    return data
 
 
 @pytest.mark.parametrize("every", [44, pytest.param(6, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("name", [pytest.param("bare", marks=pytest.mark.quick), "given", "held", "mechanism"])
 def test_a_nasty_text_is_refused_by_name(name: str, every: int, tmp_path: Path) -> None:
     """A few of the texts in each place, the next in the next."""
-    assert load(MODELS[name], tmp_path).mechanism().name == name
-    for number, (at, is_key) in enumerate(paths(MODELS[name])):
+    assert load(tmp_path, json.dumps(MODELS[name])).mechanism().name == name
+    for number, (place, is_key) in enumerate(places(MODELS[name])):
         for text in [*NASTY.values()][number % every :: every]:
             with pytest.raises(eg.ModelError) as caught:
-                load(changed(MODELS[name], at, text, is_key), tmp_path).mechanism()
+                load(tmp_path, json.dumps(changed(MODELS[name], place, text, is_key))).mechanism()
             for problem in caught.value.problems:
-                assert str(problem).isprintable(), (at, text)
+                assert str(problem).isprintable(), (place, text)
                 assert len(str(problem)) < 10_000
 
 
@@ -183,11 +162,8 @@ def test_no_name_of_a_model_makes_a_name_that_is_there(target: str, tmp_path: Pa
         for other in there - own:
             if len(other) > len(start + end) and other.startswith(start) and other.endswith(end):
                 names.add(other[len(start) : len(other) - len(end)].lower())
-    for name in sorted(
-        names | {"eomgen", "eomgen_real", "eom", "eom_x", "EOMGEN_x", "Python", "python", "structmember", "errors"}
-    ):
+    names |= {"eomgen", "eomgen_real", "eom", "eom_x", "EOMGEN_x", "Python", "python", "structmember", "errors"}
+    for name in sorted(names):
         with pytest.raises(eg.ModelError) as caught:
             eg.Model(name).mechanism()
-        assert "name" in {problem.path for problem in caught.value.problems}, (
-            f"a model {name!r} would make {target} code"
-        )
+        assert "name" in {problem.path for problem in caught.value.problems}, name

@@ -6,6 +6,7 @@ import random
 import re
 import warnings
 from collections.abc import Iterator
+from copy import deepcopy
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -103,7 +104,7 @@ class YamlFiles(Kind):
             for _ in range(r.choice((1, 1, 1, 2, 3, 6))):
                 text = broken(text, r)
             return {"stage": stage, "text": text}
-        tree = self.schema.tree(r) if k < 0.5 else copied(r.choices(self.trees, self.weights)[0])
+        tree = self.schema.tree(r) if k < 0.5 else deepcopy(r.choices(self.trees, self.weights)[0])
         changes = (0, 1, 2) if k < 0.5 else (0, 1) if stage == "compile" else (1, 1, 1, 1, 2, 2, 3, 5, 9)
         for _ in range(r.choice(changes)):
             with contextlib.suppress(KeyError, TypeError, IndexError):
@@ -193,12 +194,6 @@ def at(tree: Any, place: tuple[Any, ...]) -> Any:
     return tree
 
 
-def copied(tree: Any) -> Any:
-    if isinstance(tree, dict):
-        return {key: copied(value) for key, value in tree.items()}
-    return [copied(value) for value in tree] if isinstance(tree, list) else tree
-
-
 def number(r: random.Random) -> Any:
     """A number, or what looks like one."""
     k = r.randrange(6)
@@ -208,7 +203,7 @@ def number(r: random.Random) -> Any:
         return r.choice((1, -1)) * 10.0 ** r.uniform(-320, 308)
     if k == 2:
         return r.randint(-(10**6), 10**6)
-    return copied(r.choice(VALUES)) if k == 3 else r.choice(NUMBERS)
+    return deepcopy(r.choice(VALUES)) if k == 3 else r.choice(NUMBERS)
 
 
 def change(tree: dict[str, Any], r: random.Random, others: list[Any], keys: list[str], types: list[str]) -> None:
@@ -220,17 +215,17 @@ def change(tree: dict[str, Any], r: random.Random, others: list[Any], keys: list
     if k == 0:
         del parent[last]
     elif k in (1, 2):
-        parent[last] = copied(r.choice(VALUES))
+        parent[last] = deepcopy(r.choice(VALUES))
     elif k in (3, 4):
         parent[last] = r.choice(NUMBERS if k == 3 else TEXTS)
     elif k == 5 and isinstance(parent, dict):
         parent[r.choice((*TEXTS, *keys))] = parent.pop(last)
     elif k == 6 and isinstance(parent, dict):
-        parent[r.choice((*keys, r.choice(TEXTS)))] = copied(value)
+        parent[r.choice((*keys, r.choice(TEXTS)))] = deepcopy(value)
     elif k == 7 and isinstance(parent, list):
-        parent.insert(r.randrange(len(parent) + 1), copied(value))
+        parent.insert(r.randrange(len(parent) + 1), deepcopy(value))
     elif k == 8:
-        parent[last] = copied(at(tree, r.choice(places)))
+        parent[last] = deepcopy(at(tree, r.choice(places)))
     elif k in (9, 10):
         parent[last] = number(r)
     elif k == 11:
@@ -247,11 +242,11 @@ def change(tree: dict[str, Any], r: random.Random, others: list[Any], keys: list
     elif k == 15:
         other = r.choice(others)
         section = r.choice(list(other))
-        tree[section] = copied(other[section])
+        tree[section] = deepcopy(other[section])
     elif k == 16 and isinstance(value, dict) and value:
         one = r.choice(list(value))
         for n in range(r.choice((1, 3, 30))):
-            value[f"{one}_{n}"] = copied(value[one])
+            value[f"{one}_{n}"] = deepcopy(value[one])
     elif k == 17:
         parent[last] = [number(r) for _ in range(r.choice((0, 1, 2, 3, 4, 6, 9, 40)))]
 

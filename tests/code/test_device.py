@@ -83,21 +83,6 @@ def test_times_and_inputs_of_the_last_call_are_not_those_of_the_next(device: Any
         model.u[0] = 3.0
 
 
-def test_a_pendulum_of_any_length_falls_as_the_textbook_says(device: Any) -> None:
-    m = eg.Model("swing", gravity=(0, "-g", 0))
-    m.parameter("g", 9.81)
-    m.parameter("l", 1.0)
-    m.revolute("A", m.ground, m.body("bob", mass=1.0, com=(0, "-l", 0)), coordinate="theta")
-    m.initial(theta=0.3)
-    model = m.derive().to_cuda(device)
-    np.testing.assert_array_equal(model.x0, [0.3, 0.0])
-    lengths, angles = np.array([0.1, 0.5, 2.0]), np.array([0.1, -1.0, 3.0])
-    given = {"g": np.full(3, 9.81), "l": lengths}
-    found = model.rhs(0.0, [angles, np.zeros(3)], [given[name] for name in model.p_names])
-    np.testing.assert_allclose(found, [np.zeros(3), -9.81 / lengths * np.sin(angles)], rtol=1e-14)
-    assert model.mass_matrix(np.empty((1, 0))).shape == (1, 1, 0)
-
-
 def test_a_state_that_fails_leaves_the_others_alone(device: Any) -> None:
     model, module = pair("slider_crank", device)
     x = starts(module, 3)

@@ -5,6 +5,7 @@ import re
 import subprocess
 import zipfile
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ import eomgen as eg
 
 ABUSE = Path(__file__).with_name("fmu_abuse.c")
 EXAMPLES = sorted(path.stem for path in models.EXAMPLES.glob("*.yaml"))
-POINTS = 21
+POINTS, VERSIONS = 21, ("2.0", "3.0")
 #: Which run always: a loop in both versions, a rolling disc, a loop in space with a redundant description.
 ALWAYS = {("slider_crank", "2.0"), ("slider_crank", "3.0"), ("rolling_disc", "2.0")}
 
@@ -69,9 +70,8 @@ def initialized(instance: Any) -> None:
 def simulated(path: Path, kind: str, end: float, names: list[str], rtol: float | None) -> tuple[Any, Any]:
     """Times and columns by FMPy, after the last event of each instant."""
     step = end / (POINTS - 1)
-    rows = simulate_fmu(
-        str(path), fmi_type=kind, stop_time=end, output_interval=step, relative_tolerance=rtol, output=names
-    )
+    options = {"output_interval": step, "relative_tolerance": rtol, "output": names}
+    rows = simulate_fmu(str(path), fmi_type=kind, stop_time=end, **options)
     rows = rows[np.append(np.diff(rows["time"]) > 1e-12, True)]
     return rows["time"], {name: np.asarray(rows[name]) for name in names}
 
@@ -91,9 +91,7 @@ def moved(name: str) -> tuple[list[str], float, Any]:
     return names, end, module.simulate(end, t_eval=np.linspace(0.0, end, POINTS))
 
 
-@pytest.mark.parametrize(
-    ("name", "version"), part_of([(name, v) for name in EXAMPLES for v in ("2.0", "3.0")], ALWAYS.__contains__)
-)
+@pytest.mark.parametrize(("name", "version"), part_of(product(EXAMPLES, VERSIONS), ALWAYS.__contains__))
 def test_every_example_validates_and_moves_like_simulate(name: str, version: str, tmp_path: Path) -> None:
     path = derived(name).write_fmu(tmp_path / f"{name}.fmu", version)
     assert validate_fmu(str(path)) == []
@@ -106,13 +104,10 @@ def test_every_example_validates_and_moves_like_simulate(name: str, version: str
             assert np.abs(found[column] - expected[column]).max() <= bound * scale, (kind, column)
 
 
-@pytest.mark.parametrize(
-    ("model", "version"),
-    part_of(
-        [(model, version) for model in (ball, between_walls) for version in ("2.0", "3.0")],
-        lambda case: case in ((ball, "2.0"), (between_walls, "3.0")),
-    ),
-)
+BOTH = [(ball, "2.0"), (between_walls, "3.0")]
+
+
+@pytest.mark.parametrize(("model", "version"), part_of(product((ball, between_walls), VERSIONS), BOTH.__contains__))
 def test_events_and_resets(model: Any, version: str, tmp_path: Path) -> None:
     """Communication points 0.02 s apart meet resets to the last digit."""
     path = model().derive().write_fmu(tmp_path / "m.fmu", version)
@@ -120,20 +115,13 @@ def test_events_and_resets(model: Any, version: str, tmp_path: Path) -> None:
     expected = module.simulate(end, rtol=1e-10, atol=1e-12, t_eval=np.linspace(0.0, end, 201))
     name = module.x_names[0]
     for kind in ("CoSimulation", "ModelExchange"):
-        rows = simulate_fmu(
-            str(path), fmi_type=kind, stop_time=end, output_interval=0.02, relative_tolerance=1e-9, output=[name]
-        )
+        options = {"output_interval": 0.02, "relative_tolerance": 1e-9, "output": [name]}
+        rows = simulate_fmu(str(path), fmi_type=kind, stop_time=end, **options)
         found = np.interp(expected.t, rows["time"], np.asarray(rows[name]))
         np.testing.assert_allclose(found, expected[name], atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("speed", "version"),
-    part_of(
-        [(speed, version) for speed in (0.0, -0.1, 0.1) for version in ("2.0", "3.0")],
-        (-0.1, "3.0").__eq__,
-    ),
-)
+@pytest.mark.parametrize(("speed", "version"), part_of(product((0.0, -0.1, 0.1), VERSIONS), (-0.1, "3.0").__eq__))
 def test_an_input_that_jumps_over_an_event_resets_once(speed: float, version: str, tmp_path: Path) -> None:
     """A push of 0.25 m/s when the lever goes from 0 to 1, whichever way the motion changes the event's value.
 
@@ -221,16 +209,14 @@ def test_random_calls_neither_crash_nor_leak(model: Any, version: str, tmp_path:
         archive.extractall(tmp_path)
     sources = tmp_path / "sources"
     files = [str(file) for file in sorted(sources.glob("*.c")) if file.name != f"fmi{version}.c"]
-    flags = (
-        f"-std=c99 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all -Wall -Wextra -Werror -DVERSION={version}"
-    )
-    command = ["gcc", *flags.split(), f"-I{sources}", str(ABUSE), *files, "-o", "abuse", "-lm"]
+    flags = "-std=c99 -O1 -fsanitize=address,undefined -fno-sanitize-recover=all -Wall -Wextra -Werror"
+    command = ["gcc", *flags.split(), f"-DVERSION={version}", f"-I{sources}", str(ABUSE), *files, "-o", "abuse", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     done = subprocess.run(["./abuse", "150"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
 
 
-@pytest.mark.parametrize(("model", "version"), [(ball, "2.0"), (between_walls, "3.0")])
+@pytest.mark.parametrize(("model", "version"), BOTH)
 def test_functions_are_those_of_the_headers_of_the_standard(model: Any, version: str, tmp_path: Path) -> None:
     """A compiler compares the declarations of the standard, as FMPy has them; every function of a unit is exported."""
     with zipfile.ZipFile(model().derive().write_fmu(tmp_path / "m.fmu", version)) as archive:
@@ -292,17 +278,8 @@ def test_impacts_are_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_the_command_replaces_its_own_file_alone(tmp_path: Path) -> None:
-    words = (
-        "generate",
-        models.EXAMPLES / "slider_crank.yaml",
-        "--out",
-        tmp_path,
-        "--target",
-        "fmu",
-        "--fmi",
-        "3.0",
-        "--json",
-    )
+    example, kind = models.EXAMPLES / "slider_crank.yaml", ("--target", "fmu", "--fmi", "3.0")
+    words = ("generate", example, "--out", tmp_path, *kind, "--json")
     assert run(*words).code == 0
     told = run(*words).json
     assert (told["name"], Path(told["folder"])) == ("slider_crank", tmp_path / "slider_crank.fmu")

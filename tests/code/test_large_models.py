@@ -24,6 +24,7 @@ from scipy.integrate import quad
 from sweeps import part_of
 
 import eomgen as eg
+from benchmarks.models.linkages import closed_chain, four_bars
 
 KERNELS = ["rhs", "bias", "inverse_dynamics", "energy", "poses", "jacobian"]
 
@@ -62,9 +63,8 @@ def slides(n: int) -> eg.Model:
     m.parameter("c", 0.3)
     bodies: list[Any] = []
     for k in range(n):
-        body = m.body(
-            f"b{k}", mass=1.2, com=(0, 0.1, "c/5"), inertia={"xx": 0.03, "yy": 0.02, "zz": 0.025, "xy": 0.002}
-        )
+        tensor = {"xx": 0.03, "yy": 0.02, "zz": 0.025, "xy": 0.002}
+        body = m.body(f"b{k}", mass=1.2, com=(0, 0.1, "c/5"), inertia=tensor)
         outer = (bodies[(k - 1) // 2] if k else m.ground).at(0.1, 0.2, 0, rpy=(0.3, -0.2, 0.1 * (k % 2)))
         joint = m.prismatic if k % 2 else m.revolute
         joint(f"j{k}", outer, body, axis=(0.6, 0.0, 0.8))
@@ -164,42 +164,17 @@ def test_trees_in_c_equal_numpy(name: str) -> None:
         agree(in_c.poses(q), judge.poses(q), 1e-13, "poses")
 
 
-def closed_chain(n: int, spatial: bool) -> eg.Model:
-    """A pendulum of n links whose end is held."""
-    m = eg.Model("closed_chain", gravity=(0, "-g", 0))
-    m.parameter("g", 9.81)
-    last: Any = m.ground
-    for i in range(n):
-        link = m.body(f"b{i}", mass=1.0 + 0.01 * i, com=(0.05, 0, 0), inertia=(1e-3, 1.2e-3, 1.5e-3))
-        m.revolute(f"j{i}", last, link, axis="y" if spatial and i % 3 == 1 else "z")
-        m.guess(**{f"j{i}": 0.0 if spatial and i % 3 == 1 else 2 * np.pi / (n * (2 / 3 if spatial else 1) + 1)})
-        last = link.at(0.1, 0, 0)
-    m.torque("drive", "j0", m.input("tau", 0.3))
-    (m.spherical if spatial else m.revolute)("end", last, m.ground.at(0.02, 0.02, 0))
-    return m
-
-
-def four_bars(n: int) -> eg.Model:
-    """n parallelograms in a row, which are redundant where their cranks are parallel."""
-    m = eg.Model("four_bars", gravity=(0, "-g", 0))
-    m.parameter("g", 9.81)
-    rod: dict[str, Any] = {"mass": 1.0, "inertia": (0.01, 0.08, 0.08)}
-    cranks = [m.body(f"crank{k}", com=(0, 0.5, 0), **rod) for k in range(n + 1)]
-    for k, crank in enumerate(cranks):
-        m.revolute(f"A{k}", m.ground.at(k, 0, 0), crank)
-        m.guess(**{f"A{k}": 0.3})
-    for k in range(n):
-        coupler = m.body(f"coupler{k}", com=(0.5, 0, 0), **rod)
-        m.revolute(f"B{k}", cranks[k].at(0, 1, 0), coupler)
-        m.guess(**{f"B{k}": -0.3})
-        m.revolute(f"C{k}", coupler.at(1, 0, 0), cranks[k + 1].at(0, 1, 0))
-    m.torque("drive", "A0", m.input("tau", 0.3))
-    return m
-
-
 JUDGED = ["mass_matrix", "bias", "constraints", "constraint_jacobian", "velocity_constraints", "project"]
+
+
+def led(m: eg.Model, joint: str) -> eg.Model:
+    m.torque("drive", joint, m.input("tau", 0.3))
+    return m
+
+
 LOOPS: dict[str, Callable[[], eg.Model]] = {
-    "planar": lambda: closed_chain(18, False), "spatial": lambda: closed_chain(15, True), "bars": lambda: four_bars(6),
+    "planar": lambda: led(closed_chain(18, True, False), "j0"), "bars": lambda: led(four_bars(6), "A0"),
+    "spatial": lambda: led(closed_chain(15, True, True), "j0"),
     "stewart_platform": lambda: models.build("stewart_platform"), "excavator": lambda: models.build("excavator"),
 }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Steps, events and tables of compiled runs: every coefficient beside SciPy's methods, series beside closed forms.
+"""Steps, events and tables of compiled runs: every coefficient beside SciPy's methods, closed forms, stiff problems.
 
 Right-hand sides of any form are written as first-order states; with six states and more, steps take four at a time.
 """
@@ -17,6 +17,7 @@ from typing import Any
 import models
 import numpy as np
 import pytest
+import sympy as sm
 from analysed import compiled
 from children import HANGS
 from command import run
@@ -166,7 +167,52 @@ def test_tables_are_read_as_scipy_reads_them(kind: str) -> None:
     np.testing.assert_allclose(run["s_dot"], np.interp(t, fine, speed), atol=2e-9 if kind != "cubic" else 2e-8)
 
 
-# Ensembles: runs side by side, x'' = -k x + u, each with a stiffness of its own.
+# -- Radau IIA, stiff problems of the literature
+def test_one_step_multiplies_by_the_stability_function() -> None:
+    """R(z) = (1 + 2z/5 + z^2/20) / (1 - 3z/5 + 3z^2/20 - z^3/60): Hairer and Wanner, section IV.3, table 3.1."""
+    module = compiled("oscillator", "cython")  # q'' = -k q - c q'
+    for k, c, h in ((1.0, 0.1, 0.3), (1e8, 1e4, 0.1), (1e6, 0.0, 0.05)):
+        mod = module.bind({"k": k, "c": c})
+        x0 = np.array([1.0, -0.5])
+        solver = mod.Radau(mod.rhs, 0.0, x0, 1.0, first_step=h, max_step=h, rtol=1e-2, atol=1e9)
+        solver.step()
+        assert solver.t == h
+        Z, one = h * np.array([[0.0, 1.0], [-k, -c]]), np.eye(2)
+        top = one + 0.4 * Z + Z @ Z / 20
+        bottom = one - 0.6 * Z + 0.15 * Z @ Z - Z @ Z @ Z / 60
+        expected = np.linalg.solve(bottom, top @ x0)
+        np.testing.assert_allclose(solver.y, expected, rtol=1e-9, atol=1e-10 * np.abs(x0 * [1, np.sqrt(k)]).max())
+
+
+def test_van_der_pol() -> None:
+    """E. Hairer, G. Wanner, section IV.10 and their test set: eps = 1e-6, y(0) = (2, 0), values at t = 1 and 2."""
+    q, v, eps = *sm.symbols("q q_dot"), sm.Rational(1, 10**6)
+    model = eg.Model.from_lagrangian("van_der_pol", eps * v**2 / 2 - q**2 / 2, [q], forces={q: (1 - q**2) * v})
+    mod = model.compile(target="numpy")
+    known = {1.0: (-1.863646254808130, 0.7535430865435460), 2.0: (1.706167732170456, -0.8928097010248257)}
+    for t, expected in known.items():
+        found = solve_ivp(mod.rhs, (0, t), [2.0, 0.0], method=mod.Radau, rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(found.y[:, -1], expected, rtol=1e-10)
+    assert len(solve_ivp(mod.rhs, (0, 2), [2.0, 0.0], method=mod.Radau, rtol=1e-6, atol=1e-8).t) < 1_200
+
+
+@pytest.mark.thorough
+def test_robertson() -> None:
+    """Test set for IVP solvers (Mazzia, Magherini), problem ROBER at t = 1e11; concentrations are velocities here."""
+    names = [sm.symbols(f"q{i} q{i}_dot") for i in (1, 2, 3)]
+    (q1, a), (q2, b), (q3, c) = names
+    slow, fast, middle = sm.Float("0.04") * a, 3 * 10**7 * b**2, 10**4 * b * c
+    forces = {q1: middle - slow, q2: slow - middle - fast, q3: fast}
+    model = eg.Model.from_lagrangian("robertson", (a**2 + b**2 + c**2) / 2, [q1, q2, q3], forces=forces)
+    mod = model.compile(kernels=["rhs", "jacobian"], optimize=0)
+    atol = np.array([1e30, 1e30, 1e30, 1e-16, 1e-20, 1e-12])
+    found = solve_ivp(mod.rhs, (0, 1e11), [0, 0, 0, 1.0, 0, 0], method=mod.Radau, rtol=1e-8, atol=atol)
+    assert found.success
+    expected = [0.2083340149701255e-07, 0.8333360770334713e-13, 0.9999999791665050]
+    np.testing.assert_allclose(found.y[3:, -1], expected, rtol=1e-5)
+
+
+# -- ensembles: runs side by side, x'' = -k x + u, each with a stiffness of its own.
 
 COUNT, SLOPE, LATE = 7, 0.6, 0.4
 SAMPLES = np.linspace(0.0, 3.0, 13)

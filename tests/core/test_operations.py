@@ -156,22 +156,21 @@ def test_comparisons_are_those_of_python(place: tuple[float, float]) -> None:
     scope: dict[str, Any] = {"x": x, "y": y, "where": lambda c, a, b: a if c else b}
     truth = ("and", "or", "not ", "<", ">", "=")
     wanted = [eval(text, scope) for text in TRUTHS]  # noqa: S307 - texts of this file
-    wanted = [
-        bool(w) if any(t in text for t in truth) and "2*" not in text else w
-        for text, w in zip(TRUTHS, wanted, strict=True)
-    ]
+    pairs = zip(TRUTHS, wanted, strict=True)
+    wanted = [bool(w) if any(t in text for t in truth) and "2*" not in text else w for text, w in pairs]
     np.testing.assert_array_equal(outputs(*TRUTHS, x=x, y=y), np.array(wanted, dtype=float))
 
 
 def test_values_at_the_edges_of_domains() -> None:
-    edges = {
-        "sqrt(x)": 0.0,
-        "hypot(x, x)": 0.0,
-        "atan2(x, x)": 0.0,
-        "atan2(x, -1)": math.pi,
+    edges = {"sqrt(x)": 0.0, "hypot(x, x)": 0.0, "atan2(x, x)": 0.0, "atan2(x, -1)": math.pi}
+    edges |= {
         "atan2(-1, x)": -math.pi / 2,
+        "asin(1 - x)": math.pi / 2,
+        "acos(x - 1)": math.pi,
+        "acosh(1 + x)": 0.0,
+        "sign(x)": 0.0,
+        "x**0": 1.0,
     }
-    edges |= {"asin(1 - x)": math.pi / 2, "acos(x - 1)": math.pi, "acosh(1 + x)": 0.0, "sign(x)": 0.0, "x**0": 1.0}
     edges |= {"heaviside(x)": 0.5, "abs(x)": 0.0, "0*x + exp(-800 + x)": 0.0, "tanh(x + 800)": 1.0}
     np.testing.assert_allclose(outputs(*edges, x=0.0), list(edges.values()), rtol=1e-15)
 
@@ -180,20 +179,11 @@ def test_values_at_the_edges_of_domains() -> None:
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        ("sqrt(x)", (-1e-9, 1.0)),
-        ("log(x)", (0.0, 1.0)),
-        ("log(x)", (-1.0, 1.0)),
-        ("asin(x)", (1.0001, 1.0)),
-        ("acos(x)", (-1.0001, 1.0)),
-        ("acosh(x)", (0.99, 1.0)),
-        ("atanh(x)", (1.0, 1.0)),
-        ("x/y", (1.0, 0.0)),
-        ("x**1.3", (-8.0, 1.0)),
-        ("x**y", (-8.0, 0.5)),
-        ("x**-2", (0.0, 1.0)),
-        ("exp(x)", (800.0, 1.0)),
+        ("sqrt(x)", (-1e-9, 1.0)), ("log(x)", (0.0, 1.0)), ("log(x)", (-1.0, 1.0)), ("asin(x)", (1.0001, 1.0)),
+        ("acos(x)", (-1.0001, 1.0)), ("acosh(x)", (0.99, 1.0)), ("atanh(x)", (1.0, 1.0)), ("x/y", (1.0, 0.0)),
+        ("x**1.3", (-8.0, 1.0)), ("x**y", (-8.0, 0.5)), ("x**-2", (0.0, 1.0)), ("exp(x)", (800.0, 1.0)),
     ],
-)
+)  # fmt: skip
 def test_outside_of_a_domain_a_call_is_refused(text: str, place: tuple[float, float], target: str) -> None:
     mod, n = every_operation(target), len(NAMES)
     q = np.array([place for _, place in SMOOTH.values()])
@@ -219,9 +209,8 @@ def test_powers_of_a_depth_are_flat_where_it_is_zero(exponent: float) -> None:
     for place in (-1.0, 0.0):
         assert forces_and_slopes(law, x=place) == (0.0, 0.0)
     value, slope = forces_and_slopes(law, x=0.7)
-    assert (value[0], slope[0, 0]) == pytest.approx(
-        (3 * 0.7**exponent, 3 * exponent * 0.7 ** (exponent - 1)), rel=1e-14
-    )
+    expected = 3 * 0.7**exponent, 3 * exponent * 0.7 ** (exponent - 1)
+    assert (value[0], slope[0, 0]) == pytest.approx(expected, rel=1e-14)
 
 
 # -- random expressions -----------------------------------------------------------------------------------------------

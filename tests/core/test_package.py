@@ -44,9 +44,8 @@ def shipped(folder: str, root: Path = ROOT) -> set[str]:
 
 
 def run(*words: object, cwd: Path, **variables: str) -> str:
-    result = subprocess.run(
-        [sys.executable, *map(str, words)], cwd=cwd, env=os.environ | variables, capture_output=True, text=True
-    )
+    command, env = [sys.executable, *map(str, words)], os.environ | variables
+    result = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout
 
@@ -103,9 +102,8 @@ def test_a_model_file_needs_no_sympy(verb: str, tmp_path: Path) -> None:
 def test_a_warm_run_loads_nothing_heavy() -> None:
     loaded = "import atexit, runpy, sys; atexit.register(lambda: print('loaded', *sys.modules)); "
     for _ in range(2):  # the first may have to compile
-        text = run(
-            "-c", f"{loaded}runpy.run_module('eomgen', run_name='__main__')", "run", "--end", "0.2", MODEL, cwd=ROOT
-        )
+        code = f"{loaded}runpy.run_module('eomgen', run_name='__main__')"
+        text = run("-c", code, "run", "--end", "0.2", MODEL, cwd=ROOT)
     names = {name.partition(".")[0] for name in text.rpartition("loaded ")[2].split()}
     assert "numpy" in names
     assert not names & {"scipy", "sympy", "rich", "Cython", "pandas", "matplotlib", "mujoco", "trimesh"}
@@ -122,9 +120,8 @@ def test_a_new_model_loads_what_it_uses(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the sdist of a copy of this checkout, and the wheel built from that sdist."""
-    listed = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True
-    )
+    words = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     folder = tmp_path_factory.mktemp("copy")
     for name in listed.stdout.splitlines():
         if (ROOT / name).is_file():
@@ -143,9 +140,8 @@ def test_wheel_and_sdist_hold_everything(built: Path) -> None:
     with tarfile.open(next(built.glob("*.tar.gz"))) as sdist:
         sources = {name.partition("/")[2] for name in sdist.getnames()}
     for folder in ("templates", "examples"):
-        assert {name.removeprefix(f"eomgen/{folder}/") for name in names if f"eomgen/{folder}/" in name} == shipped(
-            folder
-        )
+        inside = {name.removeprefix(f"eomgen/{folder}/") for name in names if f"eomgen/{folder}/" in name}
+        assert inside == shipped(folder)
         assert {f"{folder}/{name}" for name in shipped(folder, copy)} <= sources
     assert {f"eomgen/{name}" for name in (*shipped("eomgen", copy), "model/element_methods.pyi", "module.pyi")} <= names
     assert sum(name.startswith("eomgen/_native.") and name.endswith(".so") for name in names) == 1
@@ -250,10 +246,7 @@ SEEN = {
     "mod.sensitivities(['l'], 1.0, rtol='1e-8')": "Sensitivities",
 }
 #: What may be several things, as a checker writes it.
-UNIONS = {
-    "mod.simulate(1.0).plot()": ("Axes", "ndarray"),
-    "mod.simulate(1.0).plot('a', 'b')": ("Axes", "ndarray"),
-}
+UNIONS = {"mod.simulate(1.0).plot()": ("Axes", "ndarray"), "mod.simulate(1.0).plot('a', 'b')": ("Axes", "ndarray")}
 BEGIN = """import eomgen as eg
 import matplotlib.pyplot as plt
 m = eg.Model("pendulum", gravity=(0, -9.81, 0))
@@ -289,9 +282,8 @@ def check(tmp_path: Path, text: str) -> list[str]:
     shutil.copytree(ROOT / "eomgen", site / "eomgen", ignore=shutil.ignore_patterns("__pycache__", "built"))
     (tmp_path / "mine.py").write_text(text)
     command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--config-file=", "mine.py"]
-    done = subprocess.run(
-        command, cwd=tmp_path, env={"MYPYPATH": str(site), "PATH": ""}, capture_output=True, text=True
-    )
+    paths = {"MYPYPATH": str(site), "PATH": ""}
+    done = subprocess.run(command, cwd=tmp_path, env=paths, capture_output=True, text=True)
     return (done.stdout + done.stderr).splitlines()
 
 

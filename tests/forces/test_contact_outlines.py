@@ -7,8 +7,9 @@ from typing import Any
 import contact_scenes as scenes
 import numpy as np
 import pytest
-from contact_scenes import ELASTIC, LAW, PLANAR, on
-from force_judges import differences, read_back
+from contact_scenes import LAW, PLANAR, on
+from force_judges import read_back
+from judges import differences
 from refusals import refuses
 from sweeps import part_of
 
@@ -215,41 +216,6 @@ def test_a_box_is_an_outline_too() -> None:
             assert np.abs(a - b).max() <= 1e-9 * max(1.0, np.abs(a).max())
         pushed += np.abs(a).max() > 100
     assert pushed > 3
-
-
-def test_a_smooth_outline_through_points_of_a_circle_is_the_circle() -> None:
-    ring = [(0.2 * math.cos(a), 0.2 * math.sin(a)) for a in (0.0, 0.9, 2.0, 3.5, 5.0)]
-    mods = []
-    for shape in ({"shape": "circle", "radius": 0.2}, {"shape": "smooth_outline", "points": ring, "depth": 0.1}):
-        m, (ball, wheel) = scenes.planar("ring", 2)
-        m.contacts("mesh", on(PLANAR["circle"], ball), on(shape, wheel), LAW)
-        mods.append(m.compile(target="numpy"))
-    for angle in np.linspace(0.01, 6.2, 19):  # not over the ends of arcs
-        x = np.array([0.29 * math.cos(angle), 0.29 * math.sin(angle), 0.2, 0, 0, 0, 0.1, 0.2, 2.0, 0.3, -0.1, 0.5])
-        a, b = (mod.rhs(0.0, x) for mod in mods)
-        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
-        a, b = (mod.jacobian(0.0, x) for mod in mods)
-        np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5 * np.abs(a).max())
-
-
-def test_pins_of_a_chain_sit_in_the_seats() -> None:
-    """Pins of the seats' radius on the pitch circle touch without force, wherever they are in the arc."""
-    m, (ball,) = scenes.planar("seats", 1, (0, 0, 0))
-    wheel = {"shape": "sprocket", "on": m.ground, **SPROCKET}
-    m.contacts("mesh", {"shape": "circle", "on": ball, "radius": 0.021}, wheel, ELASTIC)
-    mod = m.compile(target="numpy")
-    reach = 0.1 / (2 * math.sin(math.pi / 9))
-    for k in range(9):
-        turn = 2 * math.pi * k / 9
-        at = reach * np.array([math.cos(turn), math.sin(turn)])
-        for way in np.radians([-60, -30, 0, 30, 60]):  # from the bottom of the seat
-            out = -np.array([math.cos(turn + way), math.sin(turn + way)])
-            for push, told in ((0.0009, False), (0.002, True)):
-                force = -mod.bias(0.0, np.array([*(at + push * out), *np.zeros(4)]))[:2]
-                if told:
-                    np.testing.assert_allclose(force, -2e4 * 0.001**1.5 * out, atol=1e-8)
-                else:
-                    assert not force.any()
 
 
 def test_a_tooth_is_felt_on_one_side_where_it_is_narrowest() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from force_judges import differences
+from judges import differences
 from scipy.integrate import quad
 from sweeps import part_of
 

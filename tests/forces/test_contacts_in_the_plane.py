@@ -126,57 +126,6 @@ def test_gaps_are_those_of_mujoco() -> None:
         assert met > 20, pair
 
 
-def test_depth_of_a_bouncing_ball() -> None:
-    """Linear and without loss: k d^2 / 2 = m g (h + d) at the deepest point, and the height comes back."""
-    m, (ball,) = scenes.planar("ball", 1)
-    law = {"stiffness": 5e4, "exponent": 1}
-    m.contacts("floor", on(PLANAR["circle"], ball), {"shape": "half_plane", "on": m.ground}, law)
-    m.output("height", ball.position[1])
-    mod = m.compile(target="numpy")
-    h, k, W = 0.5, 5e4, G
-    traj = mod.simulate((0, 1.5), initial={"j0_y": 0.1 + h}, rtol=1e-11, atol=1e-13, t_eval=np.linspace(0, 1.5, 300001))
-    deep = (W + np.sqrt(W * W + 2 * k * W * h)) / k
-    assert 0.1 - traj["height"].min() == pytest.approx(deep, rel=1e-5)
-    later = traj["height"][traj.t > 0.5]
-    assert later.max() == pytest.approx(0.1 + h, abs=1e-6)
-
-
-@pytest.mark.thorough
-def test_angle_at_which_a_box_slides() -> None:
-    """A box slides with g (sin a - mu cos a) above atan mu, and not below it, to 1e-3 rad."""
-    mu = 0.4
-    m = eg.Model("slope", gravity=(f"{G}*sin(angle)", f"-{G}*cos(angle)", 0))
-    m.parameter("angle", 0.0)
-    box = m.body("box", mass=2.0, inertia={"zz": 0.02})
-    m.planar("j", m.ground, box)
-    law = {"stiffness": 1e6, "exponent": 1, "dissipation": 2.0, "friction": mu, "smoothing": 1e-5}
-    m.contacts("floor", {"shape": "box", "on": box, "size": (0.4, 0.1)}, {"shape": "half_plane", "on": m.ground}, law)
-    mod = m.compile(optimize=0)
-    options = {"method": "Radau", "rtol": 1e-8, "atol": 1e-11, "t_eval": [0.0, 1.0, 2.0]}
-    for angle in np.arctan(mu) + np.array([-1e-3, 1e-3]):
-        traj = mod.bind(p={"angle": angle}).simulate((0, 2), initial={"j_y": 0.05}, **options)
-        gained = traj["j_x_dot"][2] - traj["j_x_dot"][1]
-        expected = G * (np.sin(angle) - mu * np.cos(angle))
-        if expected > 0:
-            assert gained == pytest.approx(expected, rel=1e-3)
-        else:
-            assert abs(gained) < 1e-3 * abs(expected)
-            assert 0.0 < traj["j_x_dot"][2] < 1e-3
-
-
-def test_newtons_cradle() -> None:
-    """Equal spheres in a row with gaps: the last takes all of the speed."""
-    m = eg.Model("cradle", gravity=(0, 0, 0))
-    bodies = [m.body(f"b{k}", mass=1.0) for k in range(3)]
-    for k, body in enumerate(bodies):
-        m.prismatic(f"x{k}", m.ground, body, axis="x")
-    m.contacts("among", {"shape": "circle", "on": bodies, "radius": 0.05}, law={"stiffness": 1e6})
-    start: dict[str, Any] = {f"x{k}": 0.105 * k for k in range(3)} | {"x0_dot": 1.0}
-    traj = m.compile(target="numpy").simulate((0, 0.1), initial=start, rtol=1e-11, atol=1e-13)
-    speeds = np.array([traj[f"x{k}_dot"][-1] for k in range(3)])
-    assert np.allclose(speeds, [0, 0, 1], atol=1e-7)
-
-
 TILTED = [("circle", "circle", 0.16), ("box", "circle", 0.16), ("segment", "box", 0.09), ("polygon", "segment", 0.07)]
 
 

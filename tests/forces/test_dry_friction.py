@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from force_judges import differences
+from judges import differences
 from refusals import refuses
 from scipy.integrate import solve_ivp
 from sweeps import TARGETS, part_of

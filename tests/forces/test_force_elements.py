@@ -11,6 +11,7 @@ import pytest
 import sympy
 from force_judges import TREE_METHODS, P, Q, Seen, Wrench, problems, read_back
 from refusals import refused, refuses
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from sweeps import TARGETS
 from sympy.physics import biomechanics
@@ -256,11 +257,7 @@ def rub(sliding: np.ndarray, mu: float, static: float, stribeck: float, viscous:
     return -(level / np.hypot(s, smoothing) + viscous) * sliding
 
 
-CONTACTS = {
-    "point_plane": {},
-    "sphere_plane": {"radius": 0.25},
-    "sphere_sphere": {"radii": (0.4, "k/90")},
-}
+CONTACTS = {"point_plane": {}, "sphere_plane": {"radius": 0.25}, "sphere_sphere": {"radii": (0.4, "k/90")}}
 LAW = {"stiffness": 400, "exponent": 1.5, "restitution": 0.6, "velocity": 2, "formula": "flores"}
 RUB = {"friction": 0.3, "static_friction": 0.5, "stribeck": 0.2, "viscous_friction": 0.1, "smoothing": 0.05}
 
@@ -493,3 +490,144 @@ def test_a_force_on_a_joint_is_refused_with_the_remedy(tmp_path: Path) -> None:
     with refused("EG-TYPE forces.push.joint") as caught:
         eg.load(file).check()
     assert len(caught.value.problems) == 1
+
+
+# -- motions, and all elements on a closed loop
+TIGHT = {"rtol": 1e-11, "atol": 1e-13}
+
+
+def test_a_kepler_orbit() -> None:
+    """Against Kepler's equation to 34 digits, mu = 1, a = 1, e = 0.6."""
+    given = models.reference("kepler")
+    m = eg.Model("kepler")
+    m.parameter("mu", 1.0)
+    m.planar("moon", m.ground, m.body("moon", mass=0.3, inertia={"zz": 1}))
+    m.point_gravity("sun", m.ground, "moon", mu="mu")
+    mod = m.compile(target="numpy")
+    times = sorted(float(t) for t in given["reference"])
+    traj = mod.simulate((0, 10), initial={"moon_x": 0.4, "moon_y_dot": 2.0}, t_eval=times, rtol=1e-13, atol=1e-15)
+    names = ("moon_x", "moon_y", "moon_x_dot", "moon_y_dot")
+    found = np.array([[traj[name][k] for name in names] for k in range(len(times))])
+    expected = np.array([[float(x) for x in given["reference"][f"{t:g}"]] for t in times])
+    assert np.abs(found - expected).max() < 1e-10
+    T, V = mod.energy(traj.x[:, -1])
+    assert pytest.approx(-0.5, abs=1e-11) == (T + V) / 0.3  # -mu / (2 a)
+
+
+def bounce(e: float, v: float, formula: str, exponent: float) -> tuple[float, float]:
+    """A ball dropped at v onto a floor: velocity after, and the dissipation factor the model used."""
+    m = eg.Model("ball")
+    body = m.body("ball", mass=0.7)
+    m.prismatic("z", m.ground.at(0, 0, 0.1), body, axis="z")
+    law = {"exponent": exponent, "restitution": e, "velocity": v, "formula": formula}
+    m.sphere_plane("floor", m.ground, body, radius=0.1, stiffness=2e4, **law)
+    mod = m.compile(target="numpy")
+    x = mod.x0(z=0.02, z_dot=-v)
+    traj = mod.simulate((0, 0.6), initial={"z": 0.02, "z_dot": -v}, max_step=1e-3, **TIGHT)
+    assert traj["z"].min() < -1e-3
+    assert traj["z"][-1] > 0.01
+    np.testing.assert_allclose(mod.rhs(0.0, x)[1], 0.0)  # no gravity, no contact
+    pressed = mod.rhs(0.0, np.array([-0.01, -v]))[1] / mod.rhs(0.0, np.array([-0.01, 0.0]))[1]
+    return float(traj["z_dot"][-1]), (pressed - 1) / v
+
+
+@pytest.mark.parametrize(("formula", "exponent"), [("hunt_crossley", 1.5), ("lankarani", 1.5), ("flores", 1.2)])
+def test_restitution_of_a_ball(formula: str, exponent: float) -> None:
+    """m v dv = -k d^n (1 + l d') dd integrates to l v (1 + e) = log[(1 + l v) / (1 - l e v)] for every n and k."""
+    asked, v = 0.8, 1.7
+    after, l = bounce(asked, v, formula, exponent)
+    meant = {
+        "hunt_crossley": 3 * (1 - asked) / (2 * v),
+        "lankarani": 3 * (1 - asked**2) / (4 * v),
+        "flores": 8 * (1 - asked) / (5 * asked * v),
+    }
+    assert l == pytest.approx(meant[formula], rel=1e-12)
+
+    def balance(e: float) -> float:
+        return l * v * (1 + e) - np.log((1 + l * v) / (1 - l * e * v))
+
+    e = brentq(balance, 0.3, 0.999, xtol=1e-14)
+    assert after / v == pytest.approx(e, rel=1e-7)
+    assert abs(e - asked) < 0.1
+
+
+@pytest.mark.parametrize("method", ["embedding", "lagrange", "newton_euler"])
+def test_a_bushing_keeps_its_digits_near_half_a_turn(method: str) -> None:
+    """A body turned about a fixed axis n by phi: V = 2 sin(phi / 2)^2 n K n, so the torque is -n K n sin(phi)."""
+    axis, K, inertia = np.array([1.0, -2.0, 3.0]) / np.sqrt(14), np.array([2.0, 3.0, 5.0]), 0.7
+    m = eg.Model("mount")
+    m.body("block", mass=0, inertia=[inertia] * 3)
+    m.revolute("pin", m.ground, "block", axis=axis.tolist(), coordinate="phi")
+    turned = [{"body": body, "rpy": [0.3, 0.2, 0.1]} for body in ("ground", "block")]
+    m.bushing("mount", *turned, stiffness=[1.0, 1.0, 1.0, *K])
+    mod = m.compile(target="numpy", method=method)
+    along = Rotation.from_euler("ZYX", [0.1, 0.2, 0.3]).as_matrix().T @ axis
+    k = float(along @ (K * along))
+    for left in (1.0, 1e-1, 1e-2, 1e-3, 1e-5):
+        for sign in (1.0, -1.0):
+            phi = sign * (np.pi - left)
+            error = mod.rhs(0.0, np.array([phi, 0.0]))[1] * inertia / k + np.sin(phi)
+            # what is differentiated by the angle loses as 1 / e0
+            assert abs(error) < (1e-14 / left if method == "lagrange" else 1e-15)
+
+
+def test_a_nonlinear_pendulum_drive_on_an_angle() -> None:
+    """torsional_element between markers and on the joint do the same; only the potential counts as energy."""
+    results = []
+    for on in ("joint", "markers"):
+        m = eg.Model("drive")
+        m.parameter("k", 2.0)
+        disc = m.body("disc", mass=1, inertia={"zz": 0.4})
+        m.revolute("phi", m.ground, disc)
+        where = ("phi",) if on == "joint" else (m.ground, disc)
+        m.torsional_element("motor", *where, potential="k*angle**4/4", law="-0.3*rate*abs(rate)")
+        mod = m.compile(target="numpy")
+        results.append(mod.rhs(0.0, np.array([1.2, -2.0]))[1])
+        assert mod.energy(np.array([1.2, -2.0]))[1] == pytest.approx(2.0 * 1.2**4 / 4)
+    np.testing.assert_allclose(results, (-2 * 1.2**3 + 0.3 * 4.0) / 0.4, rtol=1e-13)
+
+
+def bearing_everything() -> eg.Model:
+    """The slider-crank with one element of every kind, on tree and cut joints alike."""
+    m = models.build("slider_crank")
+    slider, crank, rod = "slider", "crank", "rod.tip"
+    drum = {"around": m.ground.at(0.2, -0.3, 0), "radius": 0.05, "sense": "positive"}
+    m.element("oil", m.ground.at(0.6, 0.1, 0), slider, law="-3*rate*abs(rate) + tau/length", via=[drum])
+    m.element("stiff", "s", potential="50*length**4", law="-rate**3")
+    m.torsional_element("drive", "theta", law="-0.01*rate*abs(rate)", potential="0.1*cos(angle)")
+    m.bushing(
+        "mount", m.ground.at(0.3, 0, 0), slider, stiffness=[20, 30, 40, 1, 2, 3], damping=[1, 1, 1, 0.1, 0.1, 0.1]
+    )
+    m.point_gravity("moon", m.ground.at(0.1, 0.8, 0.2), "rod", mu=2.0, extent="maccullagh")
+    m.friction("rub", "s", viscous=0.2, coulomb=1.5, static=2.0, stribeck=0.3, smoothing=0.1)
+    m.friction("pin", "B", coulomb=0.05, smoothing=0.5)
+    m.stop("ends", "s", lower=0.3, upper=0.42, stiffness=4e3, dissipation=0.8)
+    floor = m.ground.at(0, -0.05, 0, rpy=(-np.pi / 2, 0, 0))
+    rubbing = {"stiffness": 3e3, "dissipation": 0.5, "friction": 0.3, "smoothing": 0.1}
+    m.sphere_plane("floor", floor, rod, radius=0.08, **rubbing)
+    m.point_plane("edge", floor, rod, **rubbing)
+    m.sphere_sphere("bump", crank, rod, radii=(0.2, 0.15), **rubbing)
+    m.muscle(
+        "pull",
+        m.ground.at(-0.1, 0.3, 0),
+        rod,
+        activation="0.5*exp(-t)",
+        force_max=30,
+        fiber_length=0.2,
+        slack_length=0.3,
+    )
+    return m
+
+
+def test_all_elements_on_a_closed_loop() -> None:
+    """Methods and energies agree, and the Jacobian is that of the right-hand side, loop included."""
+    m = bearing_everything()
+    modules = [m.compile(method=method, target="numpy") for method in ("embedding", "lagrange")]
+    for theta in np.linspace(0.1, 6.2, 7):
+        x = modules[0].x0(theta=theta, theta_dot=3.0)
+        a, b = (mod.rhs(0.2, x) for mod in modules)
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
+        np.testing.assert_allclose(modules[0].energy(x), modules[1].energy(x), rtol=1e-12)
+        for mod in modules:
+            slopes = judges.fine_differences(mod, x, 2e-5, 0.2)
+            assert np.abs(mod.jacobian(0.2, x) - slopes).max() <= 1e-6 * np.abs(slopes).max()

@@ -131,21 +131,6 @@ def test_chain_of_four(method, target):
         assert mod.reactions(0.0, x)[:, :2] == pytest.approx(F, rel=1e-8, abs=1e-8)
 
 
-def test_block_in_an_inclined_guide():
-    """Pushed by u along the horizontal it is held by N = m g cos + u sin: m a = m g sin - u cos -+ mu |N|."""
-    slope, mass, mu, u = 0.5, 3.0, 0.2, 20.0
-    m = eg.Model("incline", gravity=(0, -G, 0))
-    block = m.body("block", mass=mass, inertia={"zz": 0.1})
-    m.prismatic("A", m.ground.at(0, 0, 0), block, axis=(np.cos(slope), -np.sin(slope), 0))
-    m.force("push", block, value=(-u, 0, 0))
-    m.friction("rub", joint="A", coefficient=mu, smoothing=SMOOTH)
-    mod = m.compile(target="numpy")
-    normal = mass * G * np.cos(slope) + u * np.sin(slope)
-    for rate in (0.5, -0.5):
-        along = mass * G * np.sin(slope) - u * np.cos(slope) - mu * normal * np.tanh(rate / SMOOTH)
-        assert mod.rhs(0.0, [0.3, rate])[1] == pytest.approx(along / mass, rel=1e-12)
-
-
 def slider_crank(mu: float, pins: float) -> eg.Model:
     m = eg.Model("engine", gravity=(0, -G, 0))
     crank = m.body("crank", mass=1.0, inertia={"zz": 0.01}, com=(0.05, 0, 0))
@@ -216,23 +201,6 @@ def test_it_does_not_matter_where_a_loop_is_cut():
     assert found == pytest.approx([found[0]] * 3, rel=1e-10)
 
 
-def test_jacobian_of_a_loop():
-    """Along the constraints, where differences of rhs do not depend on the projection."""
-    mod = slider_crank(0.15, 0.3).compile(target="numpy")
-    h = 1e-4
-
-    def at(step):
-        return mod.x0(theta=0.9 + step[0], theta_dot=7.0 + step[1])
-
-    J = mod.jacobian(0.0, at((0, 0)))
-    for e in np.eye(2):
-        ends = [at(k * h * e) for k in (-2, -1, 1, 2)]
-        weights = np.array([1.0, -8.0, 8.0, -1.0]) / (12 * h)
-        dx = sum(w * x for w, x in zip(weights, ends, strict=True))
-        df = sum(w * mod.rhs(0.0, x) for w, x in zip(weights, ends, strict=True))
-        assert J @ dx == pytest.approx(df, rel=1e-6, abs=1e-6)
-
-
 def sliding_rod(mu: float | str) -> eg.Model:
     """A uniform rod of length 2 whose lower end slides on rough ground."""
     m = eg.Model("painleve", gravity=(0, -G, 0))
@@ -260,22 +228,6 @@ def test_limit_of_painleve(lean):
     mod = rod_of_any_friction()
     assert np.isfinite(mod.rhs(0.0, x, p={"mu": limit * (1 - 1e-6)})).all()
     refuses("EG-NOT-FINITE lean rub Painleve's", mod.rhs, 0.0, x, p={"mu": limit * (1 + 1e-6)})
-
-
-@pytest.mark.parametrize("rate", [2.0, -2.0])
-def test_sliding_rod_against_newton_euler(rate):
-    """0.5 turn'' = -N c + F s about the centre, 1.5 (c turn'' - s turn'^2) = N - 1.5 g for its height s."""
-    mu, lean, spin = 0.9, 1.1, 0.4
-    mod = sliding_rod(mu).compile(target="numpy")
-    c, s = np.cos(lean), np.sin(lean)
-
-    def turn(N):
-        return (-N * c - mu * np.sign(rate) * abs(N) * s) / 0.5
-
-    N = brentq(lambda N: N - 1.5 * (G + c * turn(N) - s * spin**2), -1e3, 1e3, xtol=1e-13)
-    x = [0.0, lean, rate, spin]
-    assert mod.rhs(0.0, x)[3] == pytest.approx(turn(N), rel=1e-10)
-    assert mod.reactions(0.0, x)[0, 1] == pytest.approx(N, rel=1e-10)
 
 
 def test_revolute_in_space():
@@ -306,18 +258,6 @@ def test_revolute_in_space():
         return moment @ axis + mu * (radius * radial + collar * abs(thrust)) * np.tanh(rate / SMOOTH)
 
     assert mod.rhs(0.0, [angle, rate])[1] == pytest.approx(brentq(balance, -1e3, 1e3, xtol=1e-13), rel=1e-11)
-
-
-def test_run_loses_what_friction_takes():
-    """Energy falls by the integral of the friction's power, which is never positive."""
-    m = slider_crank(0.1, 0.2)
-    m.output("loss", "power(guide) + power(pinA) + power(pinB) + power(pinC)")
-    mod = m.compile(target="numpy")
-    run = mod.simulate(0.1, mod.x0(), rtol=1e-10, atol=1e-12, t_eval=np.linspace(0, 0.1, 1001))
-    loss = mod.outputs(run.t, run.x)[0]
-    energy = mod.energy(run.x).sum(axis=0)
-    assert (loss <= 0.0).all()
-    assert np.trapezoid(loss, run.t) == pytest.approx(energy[-1] - energy[0], rel=1e-3)
 
 
 def test_preload_stribeck_and_viscous_parts():

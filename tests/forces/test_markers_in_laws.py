@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from force_judges import differences, read_back
+from force_judges import read_back
+from judges import differences
 from models import IN_C
 from refusals import refuses
 from scipy.spatial.transform import Rotation

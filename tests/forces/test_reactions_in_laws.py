@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from force_judges import differences, read_back
+from force_judges import read_back
+from judges import differences
 from refusals import refuses
 from scipy.spatial.transform import Rotation
 from sweeps import TARGETS
@@ -44,10 +45,7 @@ def spatial_tree(kind: str, late: bool = True) -> eg.Model:
     return with_all_reactions(m, "AB")
 
 
-@pytest.mark.parametrize(
-    ("kind", "late"),
-    [*((kind, True) for kind in KINDS), ("revolute", False), ("screw", False)],
-)
+@pytest.mark.parametrize(("kind", "late"), [*((kind, True) for kind in KINDS), ("revolute", False), ("screw", False)])
 def test_outputs_are_the_reactions_of_every_kind_of_joint(kind: str, late: bool) -> None:
     """Those of ``reactions`` of the module are summed up from numbers, and without what acts along coordinates."""
     mod = spatial_tree(kind, late).compile(target="numpy")

@@ -79,34 +79,6 @@ def test_impulses_keep_momenta_and_give_no_energy(seed: int, count: int) -> None
     assert whole > 0.9 * count
 
 
-def push(order: int) -> np.ndarray:
-    """Accelerations times masses in one scene, described in several ways."""
-    masses = np.array([1.0, 1e6, 2.0])
-    m, (a, b, c) = free_bodies(masses.tolist())
-    left, right = [shape_of(0, a), shape_of(1, b)], [shape_of(2, c)]
-    if order == 0:
-        m.contacts("c", left, right, SOFT)
-    elif order == 1:
-        m.contacts("c", right, left, SOFT)
-    elif order == 2:
-        m.contacts("c", left[::-1], right, SOFT)
-    else:
-        m.contacts("c", left[:1], right, SOFT)
-        m.contacts("d", left[1:], right, SOFT)
-    places, speeds = [0.0, 0.0, 0.1, 0.3, 0.01, -0.2, 0.15, 0.02, 0.4], [0.3, -0.2, 1.0, 0.1, 0.2, -1.0, 0.0, 0.5, 2.0]
-    x = np.array([*places, *speeds])
-    mod = m.compile(target="numpy", kernels=["rhs"])
-    return mod.rhs(0.0, x)[9:] * np.repeat(masses, 3)
-
-
-def test_order_and_split_of_groups_change_nothing() -> None:
-    found = push(0)
-    assert np.abs(found).max() > 1.0
-    assert np.abs(found.reshape(3, 3)[:, :2].sum(axis=0)).max() < 1e-12 * np.abs(found).max()
-    for order in (1, 2, 3):
-        np.testing.assert_allclose(push(order), found, rtol=1e-10, atol=1e-9)
-
-
 def test_a_shape_in_both_groups_and_groups_without_shapes_are_refused() -> None:
     """So that no pair is counted twice."""
     for first, second, told in (
@@ -222,14 +194,6 @@ def test_two_spheres_after_hertz() -> None:
             m.sphere_sphere("touch", m.ground, body, radii=(0.04, 0.06), **STEEL)
         force = m.compile(target="numpy").rhs(0.0, np.array([0.1 - 1e-5, 0.0]))[1]
         assert force == pytest.approx(4 / 3 * HERTZ_E * np.sqrt(0.024) * 1e-5**1.5, rel=1e-9)
-
-
-def test_the_law_of_hertz_needs_radii() -> None:
-    m = eg.Model("pair")
-    body = m.body("b", mass=1, inertia=(1e-3,) * 3)
-    m.prismatic("x", m.ground, body, axis="x")
-    m.sphere_sphere("touch", m.ground, body, radii=(0, 0.1), **STEEL)
-    refuses("EG-RANGE forces.touch.radii[0]", m.derive)
 
 
 def test_a_stop_with_the_linear_law() -> None:

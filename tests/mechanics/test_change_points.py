@@ -13,16 +13,8 @@ import eomgen as eg
 
 # -- A parallelogram beside one held by couplings ----------------------------------------------------------------------
 ANGLES = (0.3, 0.03, 0.01, 1e-3, 1e-5, 1e-7, 0.0)  #: from flat (rad)
-PROJECTING = (
-    "embedding",
-    "lagrange",
-    "recursive",
-    "gibbs_appell",
-    "hamilton",
-    "augmented",
-    "amalgamated",
-    "newton_euler",
-)
+PROJECTED = ("embedding", "lagrange", "recursive", "gibbs_appell", "hamilton")
+PROJECTING = (*PROJECTED, "augmented", "amalgamated", "newton_euler")
 
 
 @cache
@@ -78,10 +70,7 @@ def test_accelerations_are_those_of_the_motion_that_goes_straight_on(base: str, 
 
 
 FORMS = [(method, target) for method in PROJECTING for target in ("cython", "numpy")]
-ALWAYS = [
-    ("recursive", "cython"),
-    *((method, "numpy") for method in ("embedding", "hamilton", "augmented", "newton_euler")),
-]
+ALWAYS = [("recursive", "cython"), *((n, "numpy") for n in ("embedding", "hamilton", "augmented", "newton_euler"))]
 
 
 @pytest.mark.parametrize(("method", "target"), part_of(FORMS, ALWAYS.__contains__))
@@ -117,7 +106,6 @@ def test_at_rest_in_a_change_point_no_branch_is_chosen(target: str) -> None:
 # -- Nearly a parallelogram, in 50 digits ------------------------------------------------------------------------------
 mp.mp.dps = 50
 NAMES = ("theta", "bend", "psi")
-PROJECTED = ("embedding", "lagrange", "recursive", "gibbs_appell", "hamilton")
 
 
 @cache

@@ -97,7 +97,6 @@ def test_latch_on_a_closed_loop_against_the_impact_of_numpy() -> None:
     expected = v - Y @ np.linalg.solve(J @ Y, J @ v)
     assert after[n : n + nv] == pytest.approx(expected, rel=1e-6)
     assert abs(step[0] @ v) > 0.1
-    assert np.abs(mod.outputs(time, after)).size == 0
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -117,11 +116,9 @@ def test_grasp_in_space_keeps_momenta(target: str) -> None:
     run = mod.simulate(2.0, rtol=1e-10, atol=1e-12)
     y = mod.outputs(run.t, run.x)
     assert np.abs(y - y[:, :1]).max() < 1e-7
-    poses = run.poses()  # (n_t, n_bodies, 4, 4) or the like
     last = np.asarray([mod.poses(run.x[: mod.n_q, k]) for k in np.flatnonzero(run.t > 0.5)[[1, -1]]])
     seen = [np.linalg.solve(pair[0], pair[1]) for pair in last]
     assert seen[0] == pytest.approx(seen[1], abs=1e-7)
-    assert np.asarray(poses).size
 
 
 def test_closing_by_ida() -> None:
@@ -203,9 +200,8 @@ def test_a_lock_carries_what_the_shaft_needs_and_lets_go_where_it_is_commanded()
     assert np.abs(carried[run.t > run.t_events["clutch_opens"][0]]).max() == 0.0
     at, speed = run.t[held], run["A_dot"][held]
     assert speed == pytest.approx((J1 * W1 + J2 * W2 + 2.0 * at**2) / (J1 + J2), rel=1e-8)
-    assert run["A_dot"][-1] == pytest.approx(
-        (J1 * W1 + J2 * W2 + 2.0 * end**2) / (J1 + J2) + 2.0 * (9.0 - end**2) / J1, rel=1e-8
-    )
+    last = (J1 * W1 + J2 * W2 + 2.0 * end**2) / (J1 + J2) + 2.0 * (9.0 - end**2) / J1
+    assert run["A_dot"][-1] == pytest.approx(last, rel=1e-8)
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -70,13 +70,8 @@ def test_nutation_of_a_gyroscope_let_go(mount: str) -> None:
     case = TOP["cusp_case"]
     module = gyroscope(mount, case, TOP["parameters_SI"]["g"]).compile(target="numpy")
     period, theta = float(case["nutation_period"]), np.radians(case["theta0_deg"])
-    traj = module.simulate(
-        (0, 3 * period),
-        initial=start(mount, theta, 0.0, float(case["spin0"])),
-        t_eval=period * np.array([0, 0.5, 1, 2, 3]),
-        rtol=1e-12,
-        atol=1e-13,
-    )
+    begin, times = start(mount, theta, 0.0, float(case["spin0"])), period * np.array([0, 0.5, 1, 2, 3])
+    traj = module.simulate((0, 3 * period), begin, t_eval=times, rtol=1e-12, atol=1e-13)
     axes = np.array([axle(module, x) for x in traj.x.T])
     lean = np.arccos(axes[:, 2])
     np.testing.assert_allclose(lean[[0, 2, 3, 4]], theta, atol=1e-9)
@@ -119,9 +114,8 @@ def test_an_axisymmetric_gyrostat(held: bool, method: str) -> None:
     assert module.n_dof == (6 if held else 7)
     w0 = dict(zip(("f_wx", "f_wy", "f_wz"), map(float, case["omega0"]), strict=True))
     times = [0.0, *map(float, case["omega_t"])]
-    traj = module.simulate(
-        (0, max(times)), initial=w0 | {"spin_dot": case["Omega_rel"]}, t_eval=times, rtol=1e-12, atol=1e-13
-    )
+    begin = w0 | {"spin_dot": case["Omega_rel"]}
+    traj = module.simulate((0, max(times)), begin, t_eval=times, rtol=1e-12, atol=1e-13)
     w = np.array([traj[f"f_w{axis}"] for axis in "xyz"])
     for k, expected in enumerate(case["omega_t"].values(), 1):
         np.testing.assert_allclose(w[:, k], [float(x) for x in expected], atol=1e-10)
@@ -143,8 +137,7 @@ def test_a_reaction_wheel_turns_its_craft(method: str) -> None:
     run = 4.0
     # tau (1/J + 1/I) is the relative acceleration; a pulse of half a sine has the mean 2/pi
     peak = W / (run * 2 / np.pi * (1 / J + 1 / case["Ib"]))
-    traj = module.simulate(
-        (0, run), inputs={"tau": lambda t, x: peak * np.sin(np.pi * t / run)}, rtol=1e-11, atol=1e-12
-    )
+    tau = {"tau": lambda t, x: peak * np.sin(np.pi * t / run)}
+    traj = module.simulate((0, run), inputs=tau, rtol=1e-11, atol=1e-12)
     assert traj["spin_dot"][-1] == pytest.approx(W, rel=1e-9)
     assert traj["f_wz"][-1] == pytest.approx(float(case["body_rate"]), rel=1e-9)

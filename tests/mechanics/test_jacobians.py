@@ -110,8 +110,6 @@ CASES: dict[str, Callable[[], eg.Model]] = {
     "driven chain": driven,
     "slider-crank": lambda: eg.load(EXAMPLES / "slider_crank.yaml"),
 }
-
-
 ALWAYS_IN_C = {"spatial chain"}
 
 
@@ -130,10 +128,7 @@ def test_jacobians_are_those_of_the_dense_system(name: str) -> None:
     dense = equations.compile(target="numpy")
     for seed in range(3):
         x, t = on_constraints(dense, seed, 0.3), 0.3
-        for found, expected in (
-            (module.rhs(t, x), dense.rhs(t, x)),
-            (module.jacobian(t, x), dense.jacobian(t, x)),
-        ):
+        for found, expected in ((module.rhs(t, x), dense.rhs(t, x)), (module.jacobian(t, x), dense.jacobian(t, x))):
             assert np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max()
 
 
@@ -143,12 +138,6 @@ def test_a_jacobian_does_not_need_the_preferred_coordinates_to_move() -> None:
     module = equations.compile(target="numpy")
     for angle in (1e-3, 3e-3, 0.02):
         x = module.x0(theta=angle, theta_dot=4.0)
-        d = np.eye(module.n_x)
-        h = 1e-4
-        slopes = [
-            (8 * (module.rhs(0.0, x + h * e) - module.rhs(0.0, x - h * e))
-             - (module.rhs(0.0, x + 2 * h * e) - module.rhs(0.0, x - 2 * h * e))) / (12 * h)
-            for e in d
-        ]  # fmt: skip
+        slopes = [judges.first(lambda y: module.rhs(0.0, y), x, e, h=1e-4) for e in np.eye(module.n_x)]
         found = module.jacobian(0.0, x)
         assert np.abs(found - np.array(slopes).T).max() <= 1e-6 * np.abs(found).max()

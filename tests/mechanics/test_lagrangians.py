@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import judges
 import models
 import numpy as np
 import pytest
@@ -20,27 +21,14 @@ def test_a_pendulum_whose_support_swings(method: str) -> None:
     """The support is at a sin(w t): l theta'' = -g sin(theta) + a w^2 sin(w t) cos(theta) (Landau, sec. 5)."""
     speed = "(l*th_dot*cos(th) + a*w*cos(w*t))**2 + (l*th_dot*sin(th))**2"
     values = {"m": 1.3, "l": 0.7, "a": 0.4, "w": 3.0, "g": 9.81}
-    mod = eg.Model.from_lagrangian(
-        "support", f"m*({speed})/2 + m*g*l*cos(th)", ["th"], parameters=values
-    ).compile(method=method, target="numpy")  # fmt: skip
+    model = eg.Model.from_lagrangian("support", f"m*({speed})/2 + m*g*l*cos(th)", ["th"], parameters=values)
+    mod = model.compile(method=method, target="numpy")
     for th, rate, t in STATES:
         push = 0.4 * 9.0 * np.sin(3.0 * t) * np.cos(th)
         expected = (-9.81 * np.sin(th) + push) / 0.7
         assert mod.rhs(t, np.array([th, rate])) == pytest.approx([rate, expected], rel=1e-12)
         forces = mod.inverse_dynamics(np.array([th]), np.array([rate]), np.array([expected]), t=t)
         assert forces == pytest.approx([0.0], abs=1e-12)
-
-
-@pytest.mark.parametrize("method", OF_LAGRANGIANS)
-def test_a_mass_that_grows(method: str) -> None:
-    """d/dt (m v) = -k x with m = m0 (1 + r t): v' = -(k x + m0 r v) / m."""
-    values = {"m0": 2.0, "r": 0.3, "k": 5.0}
-    mod = eg.Model.from_lagrangian("growing", "m0*(1 + r*t)*x_dot**2/2 - k*x**2/2", ["x"], parameters=values).compile(
-        method=method, target="numpy"
-    )
-    for x, v, t in STATES:
-        expected = -(5.0 * x + 0.6 * v) / (2.0 * (1.0 + 0.3 * t))
-        assert mod.rhs(t, np.array([x, v])) == pytest.approx([v, expected], rel=1e-12)
 
 
 @pytest.mark.quick
@@ -58,9 +46,8 @@ def test_dissipation_brakes(method: str) -> None:
 @pytest.mark.parametrize("method", OF_LAGRANGIANS)
 def test_a_length_that_an_input_prescribes(method: str) -> None:
     """(l^2 theta')' = 0 on a turntable with l = 1 + t: theta' = theta'(0) / l^2, so theta'(1) = 1/4."""
-    mod = eg.Model.from_lagrangian("reel", "l**2*th_dot**2/2", ["th"], inputs={"l": 1.0}).compile(
-        method=method, target="numpy"
-    )
+    model = eg.Model.from_lagrangian("reel", "l**2*th_dot**2/2", ["th"], inputs={"l": 1.0})
+    mod = model.compile(method=method, target="numpy")
     assert mod.u_names == ("l", "l_dot")
     assert mod.rhs(0.0, np.array([0.0, 3.0]), u=[2.0, 0.5]) == pytest.approx([3.0, -2 * 0.5 / 2.0 * 3.0], rel=1e-13)
     run = mod.simulate(1.0, {"th": 0.0, "th_dot": 1.0}, inputs={"l": "1 + t"}, rtol=1e-10, atol=1e-12)
@@ -165,9 +152,8 @@ def knife_edge(constraints: Any = None) -> eg.Model:
     L = m * (x.diff(t) ** 2 + y.diff(t) ** 2) / 2 + J * phi.diff(t) ** 2 / 2 + w * x
     row = x.diff(t) * sp.sin(phi) - y.diff(t) * sp.cos(phi)
     rows = [row] if constraints is None else constraints(x, y, phi)
-    return eg.Model.from_lagrangian(
-        "skate", L, [x, y, phi], constraints=rows, parameters={m: 2.0, J: 0.3, w: 2.0 * 9.81 * 0.5}
-    )
+    values = {m: 2.0, J: 0.3, w: 2.0 * 9.81 * 0.5}
+    return eg.Model.from_lagrangian("skate", L, [x, y, phi], constraints=rows, parameters=values)
 
 
 def test_knife_edge_follows_its_cycloid() -> None:
@@ -201,11 +187,9 @@ def test_holonomic_and_nonholonomic_rows_together_and_driven() -> None:
     sideways = traj["x_dot"] * np.sin(phi) - traj["y_dot"] * np.cos(phi)
     np.testing.assert_allclose(sideways, 0.1 * np.cos(traj.t), atol=1e-11)
     np.testing.assert_allclose(x**2 + y**2, (1 + np.sin(traj.t) / 5) ** 2, atol=1e-11)
-    state, h = traj.x[:, 3], 1e-6
-    slopes = [(module.rhs(0.7, s + h * e) - module.rhs(0.7, s - h * e)) / (2 * h)
-              for s in [module.project(state, t=0.7)] for e in np.eye(6)]  # fmt: skip
-    J = module.jacobian(0.7, module.project(state, t=0.7))
-    np.testing.assert_allclose(J, np.array(slopes).T, atol=1e-6 * np.abs(J).max())
+    state = module.project(traj.x[:, 3], t=0.7)
+    J = module.jacobian(0.7, state)
+    np.testing.assert_allclose(J, judges.differences(module, state, 1e-6, 0.7), atol=1e-6 * np.abs(J).max())
     refuses("EG-UNSUPPORTED nonholonomic", getattr, module, "minimal")
 
 
@@ -216,13 +200,9 @@ def test_dependent_velocities_given_too_are_an_error() -> None:
 
 @pytest.mark.parametrize(
     ("text", "fault"),
-    [
-        ("x_dot**2 - y_dot", "EG-EXPRESSION"),
-        ("sin(x_dot)", "EG-EXPRESSION"),
-        ("x_ddot", "EG-REFERENCE 'x_ddot'"),
-        ("x == y", "EG-EXPRESSION comparison"),
-    ],
-)
+    [("x_dot**2 - y_dot", "EG-EXPRESSION"), ("sin(x_dot)", "EG-EXPRESSION"), ("x_ddot", "EG-REFERENCE 'x_ddot'"),
+     ("x == y", "EG-EXPRESSION comparison")],
+)  # fmt: skip
 def test_other_constraints_are_refused_by_name(text: str, fault: str) -> None:
     model = eg.Model.from_lagrangian("s", "x_dot**2 + y_dot**2", ["x", "y"], constraints=[text])
     refuses(f"{fault} lagrangian.constraints[0]:", model.derive)

@@ -411,8 +411,7 @@ def test_consistent_values_leave_no_residual_and_the_jacobian_is_exact(name: str
 
 
 @pytest.mark.parametrize(
-    ("name", "end", "first", "last"),
-    [("slider_crank", 0.5, 1e-5, 1e-7), ("four_bar", 1.0, 1e-4, 1e-6)],
+    ("name", "end", "first", "last"), [("slider_crank", 0.5, 1e-5, 1e-7), ("four_bar", 1.0, 1e-4, 1e-6)]
 )
 def test_ida_finds_the_trajectories_of_embedding(name: str, end: float, first: float, last: float) -> None:
     """A real solver of differential-algebraic equations on F alone: the difference falls with its tolerance."""
@@ -449,15 +448,12 @@ def test_the_ground_carries_the_change_of_momentum(method: str) -> None:
 
 def test_sizes_are_those_of_the_table() -> None:
     """Bodies b, freedoms of the tree d, equations of cut joints and couplings k, velocities n, rows m."""
+    methods = ("augmented", "newton_euler", "amalgamated")
     for name, b, d, k, n, m in (
         ("slider_crank", 3, 3, 5, 3, 2),
         ("rolling_disc", 1, 6, 3, 6, 3),
         ("chain", 3, 3, 0, 3, 0),
     ):
-        sizes = {
-            method: models.build(name).derive(method).system_size
-            for method in ("augmented", "newton_euler", "amalgamated")
-        }
-        assert sizes["newton_euler"][0] == 12 * b + k
-        assert sizes["amalgamated"][0] == 12 * b + d + k
-        assert sizes["augmented"] is None if m == 0 else sizes["augmented"][0] == n + m
+        augmented, newton_euler, amalgamated = (models.build(name).derive(method).system_size for method in methods)
+        assert (newton_euler[0], amalgamated[0]) == (12 * b + k, 12 * b + d + k)
+        assert augmented is None if m == 0 else augmented[0] == n + m

@@ -35,23 +35,19 @@ def integrated(inside: tuple) -> Numbers:
 
     volume = integral(lambda x, y, z: 1.0)
     c = np.array([integral(lambda x, y, z, k=k: (x, y, z)[k]) for k in range(3)]) / volume
-    second = np.array(
-        [[integral(lambda x, y, z, i=i, j=j: (x, y, z)[i] * (x, y, z)[j]) for j in range(3)] for i in range(3)]
-    )
+    pairs = [lambda x, y, z, i=i, j=j: (x, y, z)[i] * (x, y, z)[j] for i in range(3) for j in range(3)]
+    second = np.reshape([integral(pair) for pair in pairs], (3, 3))
     second -= volume * np.outer(c, c)
     return volume, c, np.trace(second) * np.eye(3) - second
 
 
 def round_bounds(radius, low: float, high: float) -> tuple:
     """Bounds of a body of revolution about z: x is the height, so that the radius may depend on it."""
-    return (
-        low,
-        high,
-        lambda h: -radius(h),
-        radius,
-        lambda h, y: -np.sqrt(max(radius(h) ** 2 - y * y, 0.0)),
-        lambda h, y: np.sqrt(max(radius(h) ** 2 - y * y, 0.0)),
-    )
+
+    def half(h, y):
+        return np.sqrt(max(radius(h) ** 2 - y * y, 0.0))
+
+    return low, high, lambda h: -radius(h), radius, lambda h, y: -half(h, y), half
 
 
 X_TO_Z = Rotation.from_euler("y", -np.pi / 2).as_matrix()  # the quadrature's x is the solid's z
@@ -116,11 +112,7 @@ def test_placement_turns_and_shifts_like_numpy() -> None:
     turn = Rotation.from_euler("xyz", rpy).as_matrix()
     a, b, d = np.array([0.5, 0.6, 0.7]) ** 2 / 12
     along, across = 0.05**2 / 2, 0.05**2 / 4 + 0.2**2 / 12
-    own = [
-        m[0] * turn @ np.diag([b + d, a + d, a + b]) @ turn.T,
-        m[1] * np.diag([along, across, across]),
-        np.zeros((3, 3)),
-    ]
+    own = [m[0] * turn @ np.diag([b + d, a + d, a + b]) @ turn.T, m[1] * np.diag([along, across, across]), 0.0]
     centre = m @ c / m.sum()
     total = sum(i + k * (x @ x * np.eye(3) - np.outer(x, x)) for i, k, x in zip(own, m, c - centre, strict=True))
     assert mass == pytest.approx(m.sum())
@@ -138,9 +130,7 @@ def test_a_mesh_equals_the_solid_it_bounds(tmp_path: Path, ascii_file: bool) -> 
     mesh = trimesh.creation.box((300.0, 500.0, 700.0))
     mesh.apply_translation((100.0, 0.0, 0.0))
     path = tmp_path / "part.stl"
-    path.write_bytes(trimesh.exchange.stl.export_stl(mesh)) if not ascii_file else path.write_text(
-        trimesh.exchange.stl.export_stl_ascii(mesh)
-    )
+    mesh.export(path, "stl_ascii" if ascii_file else "stl")
     place = {"at": (0.1, 0.2, 0.3), "rpy": (0.3, 0.2, 0.1)}
     m = one(solids=[{"type": "mesh", "file": path, "density": 8.0, "scale": 0.001, **place}])
     turn = Rotation.from_euler("xyz", place["rpy"]).as_matrix()

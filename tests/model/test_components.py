@@ -12,6 +12,7 @@ import pytest
 from model_files import EXAMPLES, load, schema_faults
 from refusals import refused, refuses
 from scipy.spatial.transform import Rotation
+from sweeps import part_of
 
 import eomgen as eg
 
@@ -489,10 +490,7 @@ add:
   b: {component: arm, prefix: PREFIXb, at: a.rod.end}
 """
 # with an underscore, as is usual, and without
-PREFIXES = {
-    "a_": TEXT.replace("PREFIXa", "a_").replace("PREFIXb", "b_"),
-    "a": TEXT.replace("PREFIXa", "a").replace("PREFIXb", "b"),
-}
+PREFIXES = {f"a{mark}": TEXT.replace("PREFIXa", f"a{mark}").replace("PREFIXb", f"b{mark}") for mark in ("_", "")}
 RANGE = np.linspace(0.0, 0.5, 4)
 
 
@@ -564,40 +562,26 @@ def test_an_instance_may_have_the_name_of_a_keyword(folder: Path) -> None:
 
 
 VERBS = [  # words of the command line
-    ("run", "--set", "a.q=0.2", "--set", "b.l=0.4", "--set", "b.tau=0.1", "--end", "0.1", "--target", "numpy"),
-    ("run", "--set", "vx(a.rod.end)=0.2", "--set", "x(b.rod.end)=0.3", "--end", "0.1", "--target", "numpy"),
-    ("kinematics", "--range", "a.q=0:0.5:4", "--range", "b.q=0:0.2:4", "--target", "numpy"),
-    ("kinematics", "--limits", "a.q", "--target", "numpy"),
-    ("ensemble", "--vary", "a.q=0:0.5", "--count", "3", "--end", "0.1", "--target", "numpy"),
-    ("ensemble", "--grid", "a.q=0:0.5:2", "--grid", "b.l=0.4:0.5:2", "--end", "0.1", "--target", "numpy"),
-    ("equilibrium", "--hold", "a.q=0.2", "--unknown", "a.tau", "--target", "numpy"),
-    ("sensitivity", "--by", "a.l", "--by", "b.q", "--end", "0.1", "--target", "numpy"),
-    ("inverse", "--actuated", "a.q", "--actuated", "b.q", "--accelerate", "a.q=1", "--target", "numpy"),
-    ("linearize", "--set", "a.q=0.1", "--target", "numpy"),
-    ("consistent", "--set", "a.q=0.1", "--hold", "a.q", "--weight", "b.q=3", "--target", "numpy"),
-    ("impact", "--stop", "a.q", "--set", "a.q_dot=1", "--target", "numpy"),
-    ("derive", "--independent", "a.q"),
-    pytest.param(
-        (
-            "view",
-            "--range",
-            "a.q=0:0.5:4",
-            "--trace",
-            "b.rod.end",
-            "--plot",
-            "a.q",
-            "--fps",
-            "2",
-            "--out",
-            "motion.gif",
-        ),
-        marks=pytest.mark.thorough,
-    ),
+    "run --set a.q=0.2 --set b.l=0.4 --set b.tau=0.1 --end 0.1",
+    "run --set vx(a.rod.end)=0.2 --set x(b.rod.end)=0.3 --end 0.1",
+    "kinematics --range a.q=0:0.5:4 --range b.q=0:0.2:4",
+    "kinematics --limits a.q",
+    "ensemble --vary a.q=0:0.5 --count 3 --end 0.1",
+    "ensemble --grid a.q=0:0.5:2 --grid b.l=0.4:0.5:2 --end 0.1",
+    "equilibrium --hold a.q=0.2 --unknown a.tau",
+    "sensitivity --by a.l --by b.q --end 0.1",
+    "inverse --actuated a.q --actuated b.q --accelerate a.q=1",
+    "linearize --set a.q=0.1",
+    "consistent --set a.q=0.1 --hold a.q --weight b.q=3",
+    "impact --stop a.q --set a.q_dot=1",
+    "derive --independent a.q",
+    "view --range a.q=0:0.5:4 --trace b.rod.end --plot a.q --fps 2 --out motion.gif",
 ]
 
 
-@pytest.mark.parametrize("words", VERBS, ids=lambda words: " ".join(words[:3]))
-def test_verbs_of_the_command_line(words: tuple[str, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize("line", part_of(VERBS, lambda line: not line.startswith("view")))
+def test_verbs_of_the_command_line(line: str, tmp_path: Path) -> None:
+    words = line.split() + ["--target", "numpy"] * (line.split()[0] not in ("derive", "view"))
     prefix = list(PREFIXES)[len(words) % 2]
     (tmp_path / "pair.yaml").write_text(PREFIXES[prefix], encoding="utf-8")
 

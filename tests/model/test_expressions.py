@@ -216,14 +216,6 @@ def test_arithmetic_is_pythons(drawn: list[Tree]) -> None:
     assert values(list(wanted)) == pytest.approx(list(wanted.values()), rel=1e-6, abs=1e-6)
 
 
-@settings(max_examples=10, deadline=None)
-@given(st.lists(st.text("ab(),.+-*/<>=!0123456789 eisfnotlambdx_:'\"[]{}^%@#", max_size=40), min_size=30, max_size=30))
-def test_any_text_is_read_or_refused(texts: list[str]) -> None:
-    """Whatever the text, the outcome is an expression or a fault that says where."""
-    for text, fault in zip(texts, faults(texts), strict=True):
-        assert fault is None or "column" not in fault.message or 1 <= column(fault) <= len(text) + 1
-
-
 # -- what is refused --------------------------------------------------------------------------------------------------
 HOSTILE = [
     "__import__('os').system('touch {canary}')", "open('{canary}', 'w')",
@@ -497,12 +489,8 @@ def test_other_units_are_the_same_physics() -> None:
     np.testing.assert_allclose(one.rhs(0.0, x), other.rhs(0.0, x), rtol=1e-14)
     np.testing.assert_allclose(a["reach"], 1e3 * 0.5 * np.cos(a["th"]), rtol=1e-12)
     np.testing.assert_allclose(a["turn"], np.degrees(a["th"]), rtol=1e-12)
-    assert (a.units["reach"], a.units["turn"], one.metadata["units"]["l"], one.metadata["units"]["k"]) == (
-        "mm",
-        "deg",
-        "m",
-        "N*m",
-    )
+    assert (a.units["reach"], a.units["turn"]) == ("mm", "deg")
+    assert [one.metadata["units"][name] for name in "lk"] == ["m", "N*m"]
 
 
 def test_outputs_that_cannot_be_converted_are_refused() -> None:

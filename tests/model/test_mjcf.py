@@ -402,10 +402,9 @@ PIECES = """<mujoco>{head}<worldbody>
 <body name="a" {a}><joint name="j" axis="0 1 0" {joint}/><geom name="g" size=".1" pos=".1 0 0" {geom}/>
   {site}</body>
 <body name="b" pos="3 0 0" {b}>{free}<geom name="h" size=".1" pos=".1 0 0"/></body></worldbody>{tail}</mujoco>"""
-NOTHING = dict.fromkeys(("head", "a", "joint", "geom", "site", "b", "tail"), "") | {
-    "free": "<joint name='k'/>",
-    "geom": 'contype="0" conaffinity="0"',
-}
+NOTHING = dict.fromkeys(("head", "a", "joint", "site", "b", "tail"), "")
+NOTHING |= {"free": "<joint name='k'/>", "geom": 'contype="0" conaffinity="0"'}
+CORD = '<joint joint="j" coef="1"/>'
 CASES = [
     ({}, None),
     ({"geom": ""}, "left out: contact of geoms"),
@@ -421,13 +420,10 @@ CASES = [
     ({"tail": '<keyframe><key name="home" qpos="0 0"/></keyframe>'}, "left out: stored states (<keyframe>)"),
     (
         {"site": '<site name="s"/>', "tail": '<actuator><motor name="jet" site="s"/></actuator>'},
-        "actuators that do not push along joints by a linear law (jet)",
+        "by a linear law (jet)",
     ),
     ({"tail": '<actuator><muscle name="biceps" joint="j" lengthrange="0 1"/></actuator>'}, "(biceps)"),
-    (
-        {"tail": '<tendon><fixed name="t" range="-1 1" limited="true"><joint joint="j" coef="1"/></fixed></tendon>'},
-        "tendon_limited",
-    ),
+    ({"tail": f'<tendon><fixed name="t" range="-1 1" limited="true">{CORD}</fixed></tendon>'}, "tendon_limited"),
     ({"head": '<option><flag sleep="enable"/></option>', "b": 'sleep="init"'}, "bodies at rest that MuJoCo lets sleep"),
     ({"b": 'sleep="init"'}, None),
     ({"tail": '<sensor><jointpos joint="j"/></sensor><custom><numeric name="n" data="1"/></custom>'}, None),
@@ -487,3 +483,15 @@ def test_every_field_option_and_flag_has_been_looked_at() -> None:
     members = [*mujoco.mjtDisableBit.__members__, *mujoco.mjtEnableBit.__members__]
     flags = {name.partition("_")[2] for name in members if name not in ("mjNDISABLE", "mjNENABLE")}
     assert flags == set(KNOWN_FLAGS.split())
+
+
+def test_a_weld_between_bodies_that_stand(tmp_path: Path) -> None:
+    """It holds nothing, and the model compiles."""
+    text = (
+        '<mujoco><worldbody><body name="a"><freejoint/><geom size=".1"/></body><body name="post">'
+        '<geom size=".1" pos="2 0 0"/></body>'
+        '<body name="rail"><geom size=".1" pos="3 0 0"/></body></worldbody><equality>'
+        '<weld name="w" body1="post" body2="rail"/></equality></mujoco>'
+    )
+    (tmp_path / "standing.xml").write_text(text)
+    eg.load(tmp_path / "standing.xml").compile(target="numpy")

@@ -287,13 +287,7 @@ LENGTHS = '<compiler><lengthrange mode="all" inttotal="1e9" interval="1e8" times
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    "text",
-    [
-        f"{LENGTHS}{BALL}<actuator><muscle joint='j'/></actuator>",
-        mesh("pipe.stl"),
-    ],
-)
+@pytest.mark.parametrize("text", [f"{LENGTHS}{BALL}<actuator><muscle joint='j'/></actuator>", mesh("pipe.stl")])
 def test_a_model_that_never_compiles_is_given_up(text: str, model: Any) -> None:
     refuses("EG-TOO-LARGE model.xml:1: mujoco: time", eg.load, model(text))
 

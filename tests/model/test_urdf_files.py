@@ -115,10 +115,8 @@ def test_wrong_data_is_reported(data: str, said: str, tmp_path: Path) -> None:
 
 def test_dry_friction_acts_where_it_is_requested() -> None:
     q, v = np.array([0.1, 0.2, -0.3, 0.01, 0.02]), np.array([1.0, -2.0, 0.015, 0.1, 0.0])
-    modules = [
-        eg.load(ARM, **friction).compile(target="numpy", kernels=["bias"])
-        for friction in ({}, {"friction": True}, {"friction": 0.05})
-    ]
+    given = ({}, {"friction": True}, {"friction": 0.05})
+    modules = [eg.load(ARM, **friction).compile(target="numpy", kernels=["bias"]) for friction in given]
     elbow = modules[0].q_names.index("elbow")
     without, hard, soft = (module.bias(0.0, np.concatenate([q, v])) for module in modules)
     for found, smoothing in ((hard, 0.01), (soft, 0.05)):
@@ -246,8 +244,6 @@ FOUR_BAR = f"""<robot name="four_bar"><link name="base"/><link name="a">{INERTIA
 <joint name="j2" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0.2 0 0"/><axis xyz="0 0 1"/></joint>
 <joint name="j3" type="continuous"><parent link="base"/><child link="c"/><origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
 </joint>{{}}</robot>"""
-
-
 REFUSED = [
     ('<loop_joint name="l" type="floating"><link1 link="b"/><link2 link="c"/></loop_joint>', "EG-CHOICE"),
     ('<loop_joint name="l" type="fixed"><link1 link="b"/></loop_joint>', "EG-MISSING loop_joint.l.link2:"),
@@ -267,6 +263,9 @@ STRANGE = """<robot name="strange" mood="sad"><link name="base"/><wheel size="3"
 <joint name="j" type="revolute"><parent link="base"/><child link="b"/><dynamics damping="1" spring_stiffness="4"/>
   <safety_controller k_velocity="1"/><magic/></joint>
 <transmission name="t"/><gazebo><gravity>0</gravity></gazebo></robot>"""
+DRIVES = (
+    "left out: drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor) (<transmission>)"
+)
 
 
 def test_what_is_not_known_or_given_twice_is_noted(tmp_path: Path) -> None:
@@ -275,10 +274,7 @@ def test_what_is_not_known_or_given_twice_is_noted(tmp_path: Path) -> None:
         "left out: shapes that touch, and contact (<collision>)",
         "left out: words of other formats and simulators (<dynamics spring_stiffness>, <gazebo>)",
         "left out: limits and reference positions of controllers (<safety_controller>)",
-        (
-            "left out: drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor) "
-            "(<transmission>)"
-        ),
+        DRIVES,
         "link.b: 2 <inertial>; only the first is used",
     )
 
@@ -362,12 +358,9 @@ def test_stops_hold(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("word", "told"),
-    [
-        ("limits: stop", "EG-CHOICE limits stop"),
-        ("limits: stops", "EG-CHOICE limits stops"),
-        ("check_inertia: maybe", "EG-TYPE check_inertia maybe"),
-    ],
-)
+    [("limits: stop", "EG-CHOICE limits stop"), ("limits: stops", "EG-CHOICE limits stops"),
+     ("check_inertia: maybe", "EG-TYPE check_inertia maybe")],
+)  # fmt: skip
 def test_a_word_that_does_nothing_in_a_model_file_is_refused(word: str, told: str, tmp_path: Path) -> None:
     text = (
         f"name: rod\n{word}\nbodies: {{rod: {{mass: 1, inertia: {{zz: 1}}}}}}\n"

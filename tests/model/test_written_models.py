@@ -39,9 +39,8 @@ def test_python_and_yaml_agree(tmp_path: Path) -> None:
         np.testing.assert_allclose(found[0].rhs(0.1, one), found[1].rhs(0.1, one), rtol=1e-12)
         np.testing.assert_allclose(found[0].outputs(0.1, one), found[1].outputs(0.1, one), rtol=1e-12)
     run = file.compile(target="numpy").simulate(0.01)
-    assert run["pin_x"] == pytest.approx(
-        0.1 * np.cos(run["theta"]) + 0.35 * np.cos(np.arcsin(0.1 * np.sin(run["theta"]) / 0.35))
-    )
+    place = 0.1 * np.cos(run["theta"]) + 0.35 * np.cos(np.arcsin(0.1 * np.sin(run["theta"]) / 0.35))
+    assert run["pin_x"] == pytest.approx(place)
     assert run["speed"] == pytest.approx(run["s_dot"], rel=1e-12)
     assert repr(own) == "<Model slider_crank: 6 parameters, 1 input, 3 bodies, 4 joints, 2 forces, 2 outputs>"
     assert "crank.at(r, 0, 0) to rod" in own._repr_html_()
@@ -114,11 +113,8 @@ def test_the_schema_accepts_what_is_shipped() -> None:
     assert schema_faults(SLIDER_CRANK) == []
     examples = sorted(EXAMPLES.glob("*.yaml"))
     assert len(examples) > 20
-    validator = Draft202012Validator(schema())
     for path in examples:
-        assert [error.message for error in validator.iter_errors(described(path.read_text(encoding="utf-8")))] == [], (
-            path
-        )
+        assert schema_faults(path.read_text(encoding="utf-8")) == [], path
 
 
 def test_the_schema_refuses() -> None:

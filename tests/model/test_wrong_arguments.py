@@ -7,6 +7,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import command
 import numpy as np
 import pytest
 from model_files import described, faults, load
@@ -309,7 +310,11 @@ joints:
 CIRCLE, FLOOR = "{shape: circle, on: a, radius: 0.1}", "{shape: half_plane, on: ground}"
 SHAPE = "{type: contacts, stiffness: 1e4, second: [{shape: half_plane, on: ground}], first: [{on: a, "
 SPACE = SHAPE.replace("half_plane", "half_space")
-SPHERES = "{type: sphere_sphere, between: [a, b], normal_law: hertz, radii: [0.1, 0.1], "
+CUBOID = SPACE + "shape: cuboid, size: [0.3, 0.2, 0.1], "
+POLYGON = SHAPE + "shape: polygon, points: [[0, 0], [1, 0], [2, @], [0, 1]]}]}"
+SPHERES = "{type: sphere_sphere, between: [a, b], normal_law: hertz, "
+RUBBING = "{type: friction, joint: ja, coulomb: 1, smoothing: 1, "
+BRUSH = "relaxation: [0.3, 0.2], law: brush, friction: 1, "
 RUB = "stiffness: 1e4, friction: 0.3, smoothing: 0.01, "
 LUGRE = "stiffness: 1e4, friction_law: lugre, friction: 0.3, bristle_damping: 10, "
 TYRE = "{type: tyre, between: [ground, a], radius: 0.3, stiffness: 2e5, "
@@ -334,47 +339,25 @@ CASES: list[tuple[str, str, str, float, tuple[float, ...]]] = [
     ),
     ("forces", SHAPE + "shape: circle, radius: @}]}", "first[0].radius", 0.1, NOT_POSITIVE),
     ("forces", SPACE + "shape: ellipsoid, semi_axes: [0.1, 0.2, @]}]}", "first[0].semi_axes[2]", 0.1, NOT_POSITIVE),
-    (
-        "forces",
-        SPACE + "shape: cuboid, size: [0.3, 0.2, 0.1], edge_radius: @}]}",
-        "first[0].edge_radius",
-        0.02,
-        (0.06,),
-    ),
-    (
-        "forces",
-        SHAPE + "shape: polygon, points: [[0, 0], [1, 0], [2, @], [0, 1]]}]}",
-        "first[0].points[1]",
-        0.5,
-        (0.0,),
-    ),
+    ("forces", SPACE + "shape: cuboid, size: [0.3, @, 0.1]}]}", "first[0].size[1]", 0.1, NOT_POSITIVE),
+    ("forces", CUBOID + "edge_radius: @}]}", "first[0].edge_radius", 0.02, (0.06,)),
+    ("forces", POLYGON, "first[0].points[1]", 0.5, (0.0,)),
     ("forces", "{type: stop, joint: ja, lower: 0.2, upper: @, stiffness: 10}", "upper", 1.0, (0.2, 0.1)),
     ("forces", "{type: sphere_plane, between: [ground, a], radius: @, stiffness: 1}", "radius", 0.1, NOT_POSITIVE),
-    ("forces", SPHERES + "moduli: [1e9, @], poisson: [0.3, 0.3]}", "moduli[1]", 1e9, NOT_POSITIVE),
-    ("forces", SPHERES + "moduli: [1e9, 1e9], poisson: [@, 0.3]}", "poisson[0]", 0.5, (-1.0, 0.6)),
+    ("forces", SPHERES + "radii: [@, 0.1], poisson: [0.3, 0.3], moduli: [1e9, 1e9]}", "radii[0]", 0.1, (0.0,)),
+    ("forces", SPHERES + "radii: [1, 1], poisson: [0.3, 0.3], moduli: [1e9, @]}", "moduli[1]", 1e9, NOT_POSITIVE),
+    ("forces", SPHERES + "radii: [1, 1], poisson: [@, 0.3], moduli: [1e9, 1e9]}", "poisson[0]", 0.5, (-1.0, 0.6)),
     ("forces", "{type: friction, joint: ja, viscous: @}", "viscous", 0.0, NEGATIVE),
-    (
-        "forces",
-        "{type: friction, joint: ja, coulomb: 1, smoothing: 1, static: @, stribeck: 1}",
-        "static",
-        1.0,
-        (0.9, -0.1),
-    ),
+    ("forces", RUBBING + "static: @, stribeck: 1}", "static", 1.0, (0.9, -0.1)),
     ("forces", "{type: point_gravity, center: ground, body: c, mu: @}", "mu", 1.0, NOT_POSITIVE),
     ("forces", TYRE + "relaxation: [0.1, @], law: magic_formula}", "relaxation[1]", 0.1, NOT_POSITIVE),
+    ("forces", TYRE + BRUSH + "slip_stiffness: @}", "slip_stiffness", 1.0, (0.0,)),
     (
         "forces",
-        TYRE + "relaxation: [0.3, 0.2], law: brush, friction: 1, slip_stiffness: @}",
-        "slip_stiffness",
-        1.0,
-        (0.0,),
-    ),
-    (
-        "forces",
-        "{type: creep, between: [ground, a], radius: @, longitudinal: 1, lateral: 1}",
+        "{type: creep, between: [ground, a], longitudinal: 1, lateral: 1, radius: @}",
         "radius",
         0.2,
-        NOT_POSITIVE,
+        (0.0, -1.5),
     ),
     ("constraints", "{type: gear, joints: [ja, jb], radii: [@, 0.1]}", "radii[0]", 0.2, NOT_POSITIVE),
     ("constraints", "{type: planetary, sun: ja, carrier: jb, radii: {sun: 0.1, ring: @}}", "radii", 0.3, (0.05,)),
@@ -423,3 +406,111 @@ def test_one_refusal_however_a_number_is_given(
         told = [p for p in late.value.problems if p.path.startswith(place)]
         assert told
         assert f"{value:.6g}" in str(told[0])
+
+
+# -- a name that is not known is answered by the nearest one, in the place where it is written ------------------------
+@pytest.fixture(scope="module")
+def held() -> dict[str, Any]:
+    equations = eg.load_example("pendulum").derive()
+    module = equations.compile(target="numpy")
+    parts = {"Module": module, "Trajectory": module.simulate(0.1), "Equations": equations}
+    return {"eomgen": eg, "Model": eg.Model("m"), **parts}
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("kind", "word", "meant"),
+    [
+        ("Model", "revolut", "revolute"), ("Model", "PrismaticJoint", "prismatic"), ("Model", "BODY", "body"),
+        ("Model", "add_spring", "spring"), ("Model", "gravty", "gravity"), ("Module", "mass_matrx", "mass_matrix"),
+        ("Module", "lineraize", "linearize"), ("Module", "simulate_mny", "simulate_many"), ("Module", "X0", "x0"),
+        ("Trajectory", "to_panda", "to_pandas"), ("Equations", "massmatrix", "mass_matrix"),
+        ("eomgen", "modle", "Model"),
+    ],
+)  # fmt: skip
+def test_names_in_python(held: dict[str, Any], kind: str, word: str, meant: str) -> None:
+    with pytest.raises(AttributeError, match=rf"has no attribute '{word}'; did you mean '?{meant}\b"):
+        getattr(held[kind], word)
+    assert not hasattr(held[kind], word)
+    assert getattr(held[kind], word, 3) == 3
+    with pytest.raises(AttributeError, match="zzz"):
+        held[kind].zzz  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("bodys: {a: {mass: 1}}", "bodies"), ("paramters: {a: 1}", "parameters"), ("Forces: {}", "forces"),
+        ("bodies: {a: {mas: 1}}", "mass"), ("bodies: {a: {mass: 1, CoM: [0, 0, 0]}}", "com"),
+        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolut, between: [ground, a]}}", "revolute"),
+        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolute, betwen: [ground, a]}}", "between"),
+        ("bodies: {a: {mass: 1}}\njoints: {A: {type: revolute, between: [grond, a]}}", "ground"),
+        ("bodies: {a: {mass: 1}}\nforces: {f: {type: spring, between: [ground, a], stifness: 3}}", "stiffness"),
+        ("simulation: {ends: 3}", "end"), ("simulation: {rtoll: 3}", "rtol"),
+    ],
+)  # fmt: skip
+def test_names_in_a_file(tmp_path: Path, text: str, meant: str) -> None:
+    code = "EG-CHOICE" if "revolut," in text else "EG-NAME-UNKNOWN"
+    refuses(f"{code} '{meant}'?", lambda: load(tmp_path, f"name: m\n{text}\n").check())
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["rum"], "run"), (["exmples"], "examples"), (["run", "m.yaml", "--ends", "3"], "--end"),
+        (["run", "m.yaml", "--sett", "l=1"], "--set"), (["run", "m.yaml", "--OUT", "a"], "--out"),
+    ],
+)  # fmt: skip
+def test_names_on_the_command_line(words: list[str], meant: str) -> None:
+    done = command.run(*words)
+    assert done.code == 2
+    assert f"id you mean {meant}" in done.err.replace("'", "")
+
+
+@pytest.mark.parametrize(("word", "meant"), [("initial_", "initial"), ("methd", "method"), ("teval", "t_eval")])
+def test_an_argument_of_a_run(held: dict[str, Any], word: str, meant: str) -> None:
+    refuses(f"EG-NAME-UNKNOWN '{word}' {meant}?", lambda: held["Module"].simulate((0, 1), **{word: 1.0}))
+
+
+def test_the_name_that_is_written_alike_comes_first() -> None:
+    words = {"thetta": "theta", "Theta": "theta", "hinge": "hinges", "zzzzz": ""}
+    for word, meant in words.items():
+        m = eg.Model("m")
+        for name in ("theta", "phi", "hinges"):
+            m.parameter(name, 1.0)
+        m.prismatic("s", m.ground, m.body("a", mass=word))
+        with refused(f"EG-NAME-UNKNOWN bodies.a.mass: '{word}'" + f" '{meant}'?" * bool(meant)) as caught:
+            m.check()
+        assert ("did you mean" in str(caught.value)) == bool(meant)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "m.revolut('A', m.ground, rod)",
+        "m.gravty = (0, 0, 1)",
+        "mod.simulat(1.0)",
+        "run.tt",
+        "equations.mass_matrx",
+        "eg.Modle",
+    ],
+)
+def test_a_notebook_shows_the_line_of_the_user_and_no_other(held: dict[str, Any], line: str) -> None:
+    """Through IPython's own shell: the cell, its line and the message, and nothing of eomgen's files."""
+    from IPython.core.interactiveshell import InteractiveShell
+    from IPython.utils.capture import capture_output
+
+    shell = InteractiveShell()
+    names = {"m": held["Model"], "mod": held["Module"], "run": held["Trajectory"], "equations": held["Equations"]}
+    shell.user_ns.update(names, eg=eg, rod=None)
+    with capture_output() as captured:
+        result = shell.run_cell(f"def mine():\n    {line}\nmine()", store_history=True)
+    InteractiveShell.clear_instance()
+    assert isinstance(result.error_in_exec, AttributeError)
+    text = captured.stdout + captured.stderr
+    assert "in mine" in text
+    assert line in text
+    assert "did you mean" in text
+    assert "near_names" not in text
+    assert "builder.py" not in text
+    assert len(text.splitlines()) <= 8

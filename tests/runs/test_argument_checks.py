@@ -16,8 +16,6 @@ from refusals import refused, refuses
 import eomgen as eg
 
 TARGETS = ("cython", "numpy")
-
-
 WIDE = np.broadcast_to(0.5, 10**9)
 RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "tiny max_step": (lambda m: m.simulate(1.0, max_step=1e-300), "EG-ENDLESS max_step 1e-300"),
@@ -37,7 +35,6 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "runs": (lambda m: m.simulate_many(1.0, count=10**9), "EG-TOO-LARGE simulate_many 1000000000 GiB"),
     "samples": (lambda m: m.simulate_many(1.0, count=10**6, t_eval=np.linspace(0, 1, 1000)), "EG-TOO-LARGE 1000000"),
     "time as text": (lambda m: m.rhs("a", [0.0, 0.0]), "EG-SHAPE t rhs (k,) 'a'"),
-    "state as text": (lambda m: m.rhs(0.0, "ab"), "EG-SHAPE x rhs (2,) 'ab'"),
     "a state of modes": (lambda m: m.modes("ab"), "EG-TYPE x 'ab'"),
     "no names": (lambda m: m.sensitivities(3, 1.0), "EG-TYPE names 3"),
     "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "EG-ENDLESS max_step 1e-300"),
@@ -174,7 +171,6 @@ NUMBERS: dict[str, Any] = {
     "object": np.array(sympy.Float(0.5), dtype=object),
     "nothing masked": np.ma.masked_array(0.5, mask=False),
 }
-
 UNREAL: dict[str, Any] = {
     "text": "0.5",
     "bytes": b"0.5",
@@ -228,8 +224,6 @@ DOORS: dict[str, Callable[[Any, Any], Any]] = {
     "guess": lambda m, z: m.equilibrium({m.q_names[0]: z}).q,
     "reactions": lambda m, z: m.reactions(z, m.x0()),
 }  # fmt: skip
-
-
 #: Doors of one number that a user writes, which may be an expression of numbers as text.
 WRITTEN = ("named", "named parameter", "initial", "end", "guess", "tolerance", "reactions")
 

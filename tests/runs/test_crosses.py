@@ -368,10 +368,7 @@ def sensitivities(mod: Any, u: Any, reference: Reference) -> tuple[np.ndarray, n
     found = mod.sensitivities(["k"], END, inputs={"u": u}, t_eval=TIMES)
     low, high = (Reference(reference.mechanism, reference.kind, 2.0 + h) for h in (-1e-4, 1e-4))
     slopes = (high.outputs() - low.outputs()) / 2e-4
-    dy = np.array(
-        [found.dy[name][0] if isinstance(found.dy, dict) else found.dy[i][0] for i, name in enumerate(mod.y_names)]
-    )
-    np.testing.assert_allclose(dy, slopes, atol=2e-5 * max(1.0, np.abs(slopes).max()))
+    np.testing.assert_allclose(found.dy[:, 0], slopes, atol=2e-5 * max(1.0, np.abs(slopes).max()))
     return found.trajectory.x, columns(found.trajectory, mod.y_names)
 
 
@@ -453,9 +450,8 @@ def reactions(mod: Any, u: Any, reference: Reference) -> None:
             assert np.abs(force[:2]).max() <= 1e-12
             continue
         pushed = PUSHED.get(reference.mechanism, lambda u, x: 0.0)(given[0], dict(zip(mod.x_names, x, strict=True)))
-        np.testing.assert_allclose(
-            force, rate + weight - [pushed, 0.0, 0.0], atol=1e-6 * max(10.0, np.abs(force).max())
-        )
+        expected = rate + weight - [pushed, 0.0, 0.0]
+        np.testing.assert_allclose(force, expected, atol=1e-6 * max(10.0, np.abs(force).max()))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -551,24 +547,11 @@ def functional_mockup_unit(mod: Any, u: Any, reference: Reference) -> None:
 
 
 CALLS: dict[str, Callable[..., tuple[np.ndarray, np.ndarray] | None]] = {
-    "simulate": simulated,
-    "Radau": partial(simulated, method="Radau"),
-    "BDF": partial(simulated, method="BDF"),
-    "sensitivities": sensitivities,
-    "ensemble": ensemble,
-    "dae": differential_algebraic,
-    "impacts": impacts,
-    "fit": fit,
-    "linearize": linearize,
-    "again": again,
-    "minimal": minimal,
-    "reactions": reactions,
-    "equilibrium": equilibrium,
-    "package": exported,
-    "casadi": in_casadi,
-    "rigid": rigid,
-    "fmu": functional_mockup_unit,
-}
+    "simulate": simulated, "Radau": partial(simulated, method="Radau"), "BDF": partial(simulated, method="BDF"),
+    "sensitivities": sensitivities, "ensemble": ensemble, "dae": differential_algebraic, "impacts": impacts, "fit": fit,
+    "linearize": linearize, "again": again, "minimal": minimal, "reactions": reactions, "equilibrium": equilibrium,
+    "package": exported, "casadi": in_casadi, "rigid": rigid, "fmu": functional_mockup_unit,
+}  # fmt: skip
 CELLS = [(m, list(KINDS)[(i + j) % len(KINDS)], c) for i, m in enumerate(MECHANISMS) for j, c in enumerate(CALLS)]
 #: Cells that are refused -> what the error must tell.
 REFUSED: dict[tuple[str, str], str] = {
@@ -591,8 +574,6 @@ REFUSED: dict[tuple[str, str], str] = {
     ("driven", "linear"): "EG-JUMP jumps",
     ("driven", "function"): "needs its rate u_dot",
 }
-
-
 #: Calls at one state, which take values of inputs.
 AT_ONE_STATE = ("linearize", "minimal", "reactions", "equilibrium", "casadi", "fmu")
 #: Dear ones: stiff contacts in Python, and builds in C.

@@ -1,16 +1,18 @@
-"""Many runs at once against SciPy and closed forms, and the bits of every run, however runs are shared out."""
+"""Many runs at once: against SciPy and closed forms, bits however they are shared out, kept in folders, on workers."""
 
 import tracemalloc
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import analysed
+import distributed
 import models
 import numpy as np
 import pytest
 from models import IN_C
-from refusals import refuses
+from refusals import refused, refuses
 from scipy.integrate import solve_ivp
 
 import eomgen as eg
@@ -326,15 +328,8 @@ def test_a_run_without_lanes_has_the_bits_of_simulate(method: str) -> None:
         assert run.nfev == ensemble.evaluations[j]
 
 
-def test_results_do_not_depend_on_threads_blocks_or_lanes(pendulum: Any) -> None:
+def test_statistics_do_not_depend_on_threads_and_blocks_nor_ends_on_lanes(pendulum: Any) -> None:
     k, times = 600, np.linspace(0, 2, 3)
-    whole = pendulum.simulate_many(2, angles(k), t_eval=times, **TIGHT)
-    one = pendulum.simulate_many(2, angles(k), t_eval=times, threads=1, block=7, **TIGHT)
-    np.testing.assert_array_equal(whole.samples, one.samples)
-    turned = {name: x[::-1] if np.ndim(x) else x for name, x in angles(k).items()}
-    np.testing.assert_array_equal(pendulum.simulate_many(2, turned, **TIGHT).x[:, ::-1], whole.x)
-    few = {name: x[5:8] if np.ndim(x) else x for name, x in angles(k).items()}
-    np.testing.assert_array_equal(pendulum.simulate_many(2, few, **TIGHT).x, whole.x[:, 5:8])
     statistics = [
         pendulum.simulate_many(2, angles(k), t_eval=times, reduce="statistics", **options, **TIGHT).reduced
         for options in ({}, {"threads": 1, "block": 256})
@@ -342,7 +337,8 @@ def test_results_do_not_depend_on_threads_blocks_or_lanes(pendulum: Any) -> None
     for name, value in statistics[0].items():
         np.testing.assert_array_equal(value, statistics[1][name])
     one = compiled("double_pendulum", "cython", 0)  # a state at a time with the steps of simulate
-    np.testing.assert_allclose(one.simulate_many(2, angles(k), **TIGHT).x, whole.x, rtol=0, atol=3e-8)
+    ends = [module.simulate_many(2, angles(k), **TIGHT).x for module in (one, pendulum)]
+    np.testing.assert_allclose(*ends, rtol=0, atol=3e-8)
 
 
 def shares(module: Any, span: Any, columns: dict[str, Any], k: int, parameters: Any = (), **options: Any) -> list[Any]:
@@ -438,16 +434,6 @@ def test_parameters_by_column(target: str) -> None:
     refuses("EG-NOT-FINITE rhs theta", crank.rhs, 0.0, x, p=p)
 
 
-def test_a_run_that_fails_holds_up_no_other() -> None:
-    """s'' = 2 s^3 from s = s' = 1 ends at t = 1; from 0.5 at t = 2 (s = 1/(2 - t))."""
-    s = np.array([0.5, 1.0, 0.5, 0.25, 1.0, 0.5, 0.25, 0.5, 0.5])
-    tight = {"first_step": 1e-3, "method": "Taylor", "rtol": 1e-11, "atol": 1e-13}
-    many = compiled("oscillator").simulate_many(1.5, {"s": s, "s_dot": s**2}, {"a": -2.0}, **tight)
-    np.testing.assert_array_equal(many.ok, s < 1)
-    np.testing.assert_allclose(many.x[0, s < 1], 1 / (1 / s[s < 1] - 1.5), rtol=1e-9)
-    np.testing.assert_allclose(many.t_end[s == 1], 1.0, atol=1e-6)
-
-
 def test_a_grid_has_every_combination() -> None:
     crank = compiled("slider_crank", "numpy")
     grid = {"theta": (-0.5, 0.5, 3), "r": [0.09, 0.11], "tau": [0.0, 1.0]}
@@ -473,3 +459,112 @@ def test_a_grid_has_every_combination() -> None:
 )
 def test_faults_of_grids(crank: Any, grid: object, told: str) -> None:
     refuses(told, crank.simulate_many, 0.1, {"theta_dot": 0.2}, grid=grid)
+
+
+# -- kept in folders, run on workers of dask.distributed ---------------------------------------------------------------
+def test_only_what_is_missing_is_run_again(pendulum: Any, tmp_path: Path) -> None:
+    whole = pendulum.simulate_many(1, angles(40))
+    folder = tmp_path / "runs"
+    pendulum.simulate_many(1, angles(40), store=folder, block=8)
+    blocks = sorted(folder.glob("block_*.npz"))
+    assert len(blocks) == 5
+    for gone in (blocks[1], blocks[4]):  # as where a run was stopped
+        gone.unlink()
+    kept = {path: path.stat().st_mtime_ns for path in blocks if path.exists()}
+    resumed = pendulum.simulate_many(1, angles(40), store=folder, block=8)
+    np.testing.assert_array_equal(resumed.x, whole.x)
+    np.testing.assert_array_equal(resumed.steps, whole.steps)
+    assert sorted(folder.glob("block_*.npz")) == blocks
+    assert all(path.stat().st_mtime_ns == written for path, written in kept.items())
+
+
+def test_a_store_of_another_ensemble_is_refused(pendulum: Any, tmp_path: Path) -> None:
+    pendulum.simulate_many(1, angles(4), store=tmp_path / "runs")
+    for changed in (
+        {"span": 2}, {"initial": angles(4, seed=1)}, {"parameters": {"g": 1.0}}, {"rtol": 1e-3},
+    ):  # fmt: skip
+        with refused("EG-FILE-DAMAGED ensemble"):
+            pendulum.simulate_many(**{"span": 1, "initial": angles(4), **changed}, store=tmp_path / "runs")
+    (tmp_path / "mine.txt").write_text("precious")
+    refuses("EG-FILE ensemble", lambda: pendulum.simulate_many(1, angles(4), store=tmp_path))
+    block = next((tmp_path / "runs").glob("block_*"))
+    block.write_bytes(block.read_bytes()[:700])
+    refuses("EG-FILE-DAMAGED remove", lambda: pendulum.simulate_many(1, angles(4), store=tmp_path / "runs"))
+
+
+def test_what_a_killed_call_left_is_no_hindrance(pendulum: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    part = folder / ".manifest.json.0a1b2c3d"
+    part.write_bytes(b"torn")
+    whole = pendulum.simulate_many(1, angles(40), store=folder)
+    assert not part.exists()
+    names = sorted(path.name for path in folder.iterdir())
+    assert len(names) > 2, "a kill would lose all of it"
+    (folder / f".{names[0]}.0a1b2c3d").write_bytes(b"torn")
+    (folder / names[0]).unlink()
+    again = pendulum.simulate_many(1, angles(40), store=folder)
+    assert sorted(path.name for path in folder.iterdir()) == names
+    np.testing.assert_array_equal(again.x, whole.x)
+
+
+def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    pendulum.simulate_many(1, angles(20), store=folder, block=10)
+    block, manifest = folder / "block_000000.npz", folder / "manifest.json"
+    good, text = block.read_bytes(), manifest.read_text()
+    with np.load(block) as data:
+        arrays = {name: data[name] for name in data.files}
+    changes: tuple[dict[str, Any], ...] = (
+        {"runs_t": arrays["runs_t"][:3]}, {"x": arrays["x"][:1]}, {"x": arrays["x"] + 1.0}, {"more": np.zeros(3)},
+        {"words": np.array("[1, 2]")}, {"words": np.array("[" * 99999)},
+    )  # fmt: skip
+    files = [{("old" if name == one else name): x for name, x in arrays.items()} for one in arrays]
+    for damaged in (*files, *(arrays | change for change in changes)):
+        np.savez(block, **damaged)
+        with refused("EG-FILE-DAMAGED block_000000.npz"):
+            pendulum.simulate_many(1, angles(20), store=folder)
+    block.write_bytes(good)
+    for other in ("{}", "[" * 99999, text.replace('"block": 10', '"block": -1')):
+        manifest.write_text(other)
+        with refused("EG-FILE-DAMAGED ensemble"):
+            pendulum.simulate_many(1, angles(20), store=folder)
+
+
+WARNINGS = pytest.mark.filterwarnings("default")  #: of distributed itself
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@WARNINGS
+@pytest.mark.slow
+def test_workers_give_the_same_bits(pendulum: Any, client: Any) -> None:
+    here = pendulum.simulate_many(2, angles(50), **TIGHT)
+    there = pendulum.simulate_many(2, angles(50), cluster=client, block=9, **TIGHT)
+    np.testing.assert_array_equal(there.x, here.x)
+    np.testing.assert_array_equal(there.evaluations, here.evaluations)
+
+
+@WARNINGS
+@pytest.mark.slow
+def test_a_block_whose_task_fails_is_marked_and_the_others_are_kept(pendulum: Any, client: Any, tmp_path: Path) -> None:
+    def refuse(block: Any) -> dict[str, Any]:
+        if block.x[0].max() > 0.9 and np.isfinite(block.x).all():
+            raise ArithmeticError("too high")
+        return {"top": block.x[0].max()}
+
+    starts = {"theta1": np.array([0.1, 0.2, 2.0, 0.3]), "theta1_dot": 0.0}
+    ensemble = pendulum.simulate_many(1e-3, starts, reduce=refuse, cluster=client, block=1, store=tmp_path / "runs")
+    (failure,) = ensemble.failures()
+    assert failure.run == 2
+    assert "ArithmeticError: too high" in failure.message
+    assert len(list((tmp_path / "runs").glob("block_*.npz"))) == 3  # what failed is run again next time

@@ -181,19 +181,15 @@ def test_a_ball_let_go_above_a_plane_comes_to_rest_on_it() -> None:
     np.testing.assert_allclose(mod.modes().frequencies, np.sqrt(1.5e5 * np.sqrt(depth)), rtol=1e-9)
 
 
-def elastic_pendulum() -> Any:
+def test_an_elastic_pendulum_of_any_stiffness_from_any_angle() -> None:
+    """Hanging: y = -(1 + m g/k), frequencies sqrt(k/m) and sqrt(g/l); standing: 1 - m g/k, unstable."""
     m = eg.Model("p", gravity=(0, -9.81, 0))
     slide, bob = m.body("c", mass=0), m.body("b", mass=1)
     m.parameter("k", 1e5)
     m.prismatic("X", m.ground, slide, axis="x", coordinate="x")
     m.prismatic("Y", slide, bob, axis="y", coordinate="y")
     m.spring("s", m.ground, bob, stiffness="k", length=1)
-    return m.compile(target="numpy")
-
-
-def test_an_elastic_pendulum_of_any_stiffness_from_any_angle() -> None:
-    """Hanging: y = -(1 + m g/k), frequencies sqrt(k/m) and sqrt(g/l); standing: 1 - m g/k, unstable."""
-    mod = elastic_pendulum()
+    mod = m.compile(target="numpy")
     for k in (1e2, 1e5, 1e10):
         for angle in (0.05, 1.5, 3.1):
             found = mod.equilibrium({"x": np.sin(angle), "y": -np.cos(angle)}, p={"k": k})
@@ -263,9 +259,8 @@ def test_the_inner_length_of_a_maxwell_element_comes_to_rest_too(method: str) ->
         assert linear.is_equilibrium
         np.testing.assert_allclose(linear.drift, 0, atol=1e-13)
         # s' = 15 (x1 - s), x1'' = -40 x1 + 30 s: l^3 + 15 l^2 + 40 l + 150 = 0
-        np.testing.assert_allclose(
-            np.sort_complex(found.eigenvalues), np.sort_complex(np.roots([1, 15, 40, 150])), rtol=1e-12
-        )
+        expected = np.sort_complex(np.roots([1, 15, 40, 150]))
+        np.testing.assert_allclose(np.sort_complex(found.eigenvalues), expected, rtol=1e-12)
         assert found.stability == "asymptotically stable"
         run = found.module.simulate(5, initial=found.x)
         np.testing.assert_allclose(run["x1"], F / 10, atol=1e-9)
@@ -277,19 +272,15 @@ def test_a_row_that_never_rests_is_refused() -> None:
     refuses("EG-NO-EQUILIBRIUM 3", mod.equilibrium)
 
 
-def pendulum_beside(stiffness: float, mass: float) -> Any:
+@pytest.mark.parametrize(("stiffness", "mass"), [(1e8, 1e-6), (1e10, 1e-8)])
+def test_slow_motions_beside_stiff_ones_are_seen(stiffness: float, mass: float) -> None:
     """A pendulum of length 1 and a tiny mass on a stiff spring, which have nothing to do with each other."""
     m = eg.Model("beside", gravity=(0, -9.81, 0))
     bob, tiny = m.body("bob", mass=1.0, com=(0, -1, 0)), m.body("tiny", mass=mass)
     m.prismatic("s", m.ground, tiny, axis="x")
     m.spring("k", m.ground.at(-1, 0, 0), tiny, stiffness=stiffness, length=1.0)
     m.revolute("R", m.ground, bob, coordinate="th")
-    return m.compile(target="numpy")
-
-
-@pytest.mark.parametrize(("stiffness", "mass"), [(1e8, 1e-6), (1e10, 1e-8)])
-def test_slow_motions_beside_stiff_ones_are_seen(stiffness: float, mass: float) -> None:
-    mod = pendulum_beside(stiffness, mass)
+    mod = m.compile(target="numpy")
     slow, fast = np.sqrt(9.81), np.sqrt(stiffness / mass)
     hanging, upright = mod.x0(th=0.0, s=0.0), mod.x0(th=np.pi, s=0.0)
     modes = mod.modes(hanging)
@@ -354,8 +345,7 @@ def test_an_unknown_parameter_far_from_the_guess_is_found() -> None:
     m.spring("s", m.ground.at(1, 0.7, 0), place.at(0.3, 0, 0), stiffness=k, length=length)
     m.spring("s2", m.ground.at(-0.4, 0.9, 0), place.at(0.1, 0, 0), stiffness=5, length=0.5)
     m.stop("st", "q2", law={"stiffness": 200}, lower=-1, upper=1)
-    found = m.compile(target="numpy").equilibrium(
-        guess={"q0": -2.439, "q2": -2.214}, hold={"q1": -2.474}, unknowns=["l0"]
-    )
+    guess = {"q0": -2.439, "q2": -2.214}
+    found = m.compile(target="numpy").equilibrium(guess, hold={"q1": -2.474}, unknowns=["l0"])
     assert found["l0"] == pytest.approx(1.33746, abs=1e-5)
     assert found["q0"] == pytest.approx(-1.2475, abs=1e-4)

@@ -440,16 +440,6 @@ def test_no_zero_is_found_in_a_gap_and_those_beside_it_are(modules: dict[str, An
             np.testing.assert_allclose(found.t_events["own"], GAPS[text], atol=1e-9, err_msg=f"{target} {method}")
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
-def test_ensembles_meet_them_as_well(modules: dict[str, Any], target: str) -> None:
-    options = {"method": "RK45", "events": levels(12), "keep_events": 200, **CLOSE}
-    many = modules[target].simulate_many((0, END), {"h": np.array([1.0, 0.9, 1.0])}, **options)
-    assert (many.status == 0).all()
-    assert (many.t_end == END).all()
-    for name, expected in {"floor": bounces(), "same": passages(0.05, 0), "level4": passages(0.2, 1)}.items():
-        np.testing.assert_allclose(many.events(name)[0][: len(expected), 0], expected, atol=1e-8, err_msg=name)
-
-
 @pytest.mark.parametrize("n", part_of([0, 6, 7, 18], lambda n: n == 7))
 def test_resets_that_die_away_are_named_by_every_loop(modules: dict[str, Any], n: int) -> None:
     """Never status 0 before the end, and never through the floor: with 7 events a run once ended so at 1.35 s of 10."""

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from analysed import compiled
 from models import IN_C
 from refusals import refuses
 from scipy.optimize import curve_fit
@@ -34,8 +33,6 @@ def arm(**values: Any) -> eg.Model:
 
 
 START = {"a": 0.6, "b": -0.9}
-
-
 DRIVE = {"tau": "4*sin(5*t) + 3*sin(2.3*t)"}
 
 
@@ -169,18 +166,6 @@ def test_several_experiments_initial_values_and_inputs_together() -> None:
 
 
 START_OF_ONE = {"theta": 0.7, "theta_dot": 0.0}
-
-
-def test_a_closed_loop() -> None:
-    """The load of a slider-crank from its crank's angle."""
-    mod = compiled("slider_crank", "cython")
-    name = next(name for name in mod.p_names if name.startswith("m_s"))
-    true = float(mod.p[mod.p_names.index(name)])
-    run = mod.simulate(1.0, t_eval=np.linspace(0.0, 1.0, 60))
-    random = np.random.default_rng(2)
-    data = {"t": run.t, "theta": run["theta"] + random.normal(0, 1e-3, 60)}
-    fit = mod.fit(data, {name: 1.5 * true})
-    assert abs(fit.values[name] - true) < 3 * fit.errors[name]
 
 
 @pytest.mark.parametrize(

@@ -92,11 +92,8 @@ def one_of_the_sets(A: Any, need: Any, involved: Any) -> Any:
             g = np.zeros(len(need))
             g[chosen] = np.linalg.lstsq(A[np.ix_(chosen, chosen)], need[chosen], rcond=1e-12)[0] if chosen else 0.0
             slack = (A @ g - need)[involved]
-            if (
-                (g >= -1e-12).all()
-                and (slack >= -1e-10).all()
-                and np.abs((A @ g - need)[chosen]).max(initial=0) < 1e-10
-            ):
+            met = np.abs((A @ g - need)[chosen]).max(initial=0) < 1e-10
+            if (g >= -1e-12).all() and (slack >= -1e-10).all() and met:
                 return g
     raise AssertionError("no set fits")
 
@@ -305,20 +302,14 @@ def test_a_locked_joint_is_a_weld_in_impacts_with_friction() -> None:
 
 
 TEN, SPEED = 10.0, 0.5
-
-
 WAYS: dict[str, Any] = {
     "text": "0.5*t",
     "line": ([0.0, 2.0], [0.0, 1.0]),
     "bent": ([-1.0, 0.0, 2.0], [0.0, 0.0, 1.0]),
     "spline": eg.Signal([0.0, 0.2, 0.6], [0.0, 0.1, 0.3], "cubic"),
 }
-
-
 #: The ball meets the floor where 1 - g t^2/2 = w t.
 HIT = (-SPEED + np.sqrt(SPEED**2 + 2.0 * TEN)) / TEN
-
-
 AFTER = 2.0 * SPEED + TEN * HIT
 
 

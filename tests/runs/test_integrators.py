@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import command
 import mpmath
 import numpy as np
 import pytest
@@ -235,21 +234,6 @@ def test_a_run_takes_the_declared_steps(path: Path) -> None:
     np.testing.assert_allclose(many.x[:, 0], run.x[:, -1], rtol=1e-12)
 
 
-def test_the_command_line_takes_them(path: Path) -> None:
-    def run(*words: object) -> Any:
-        return command.run("run", *words, "--json").json
-
-    declared, given = run(path), run(path, "--solver", "rk4", "--step", "0.01")
-    assert declared["final"] == given["final"]
-    other = run(path, "--solver", "DOP853")
-    assert other["final"] != declared["final"]
-    assert other["final"]["q"] == pytest.approx(declared["final"]["q"], abs=1e-7)
-    assert run(path, "--step", "0.02")["final"] != declared["final"]
-    refused = command.run("run", path, "--solver", "RK45", "--step", "0.1")
-    assert refused.code == 2
-    assert "RK4" in refused.err
-
-
 def test_steps_are_of_order_four() -> None:
     """Order 4, whole steps, and the same steps one by one."""
     mod = compiled("double_pendulum", "cython")
@@ -315,8 +299,6 @@ FORCES = {
     ),
     "time": ("sin(2*t)*x - t*v/5 - x", lambda m, x, v, t: m.sin(2 * t) * x - t * v / 5 - x),
 }  # fmt: skip
-
-
 A, B = 0.75, -1.5  #: parameters a and b
 COLUMNS = list(FORCES)
 ALWAYS = ("products", "quotients", "sin, cos", "atan2", "real powers", "powers through 0", "multiples squared", "time")
@@ -424,10 +406,7 @@ def test_models_without_series_say_so() -> None:
     body = m.body("mass", mass=1.0)
     m.prismatic("J", m.ground, body, axis="x", coordinate="s")
     m.torque("push", "J", "-max(s, 0)")
-    for target, why in (
-        ("cython", "max"),
-        ("numpy", "target='numpy'"),
-    ):
+    for target, why in (("cython", "max"), ("numpy", "target='numpy'")):
         refuses(f"EG-UNSUPPORTED stop Taylor {why}", m.compile(target=target).simulate, 1, method="Taylor")
 
 

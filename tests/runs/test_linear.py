@@ -172,9 +172,10 @@ def test_choices_and_mistakes() -> None:
         refuses(message, mod.linearize, **wrong)
 
 
-def changes(mod: object, x: np.ndarray) -> None:
+def test_changes_of_states_of_a_loop() -> None:
     """At an equilibrium J T = T A; and x + h T s stays on the constraints to second order."""
-    lin = mod.linearize(x)
+    mod = compiled("four_bar")
+    lin = mod.linearize(mod.equilibrium().x)
     T = lin.to_x
     assert T.shape == (mod.n_x, len(lin.states))
     J = mod.jacobian(0.0, lin.x)
@@ -186,12 +187,6 @@ def changes(mod: object, x: np.ndarray) -> None:
         away.append(np.abs(mod.project(moved) - moved).max())
     assert away[0] < 1e-4
     assert away[1] < 0.3 * away[0] + 1e-13  # a quarter: second order
-
-
-def test_changes_of_states_of_a_loop() -> None:
-    mod = compiled("four_bar")
-    found = mod.equilibrium()
-    changes(mod, found.x)
 
 
 def test_modes_of_a_double_pendulum() -> None:

@@ -313,6 +313,3 @@ def test_files_that_are_no_runs(tmp_path: Path) -> None:
     refuses("EG-FILE-DAMAGED format", eg.load_trajectory, tmp_path / "y.npz")
     with pytest.raises(FileNotFoundError):
         eg.load_trajectory(tmp_path / "none.npz")
-    run = models.build("pendulum").compile(target="numpy").simulate(0.1)
-    for name in ("run.xls", "run.xlsx.gz"):
-        refuses("EG-FILE .npz .csv", run.save, tmp_path / name)

@@ -14,14 +14,8 @@ from sweeps import TARGETS
 import eomgen as eg
 
 MASS, TARGET = 2.0, 0.1
-
-
 GAINS = {"kp": 8.0, "ki": 5.0, "kd": 4.0}
-
-
 LAW = {"z": "z + T*(target - s)", "u": "kp*(target - s) + ki*z - kd*s_dot"}
-
-
 TEXT = """
 name: servo
 parameters: {T: {value: 100, unit: ms}, first: 0, kp: 8, ki: 5, kd: 4}
@@ -275,12 +269,6 @@ def test_controllers_that_cannot_be_are_refused(module: Any) -> None:
     refuses("EG-NUMBER u nan 0", module.simulate, 1.0, controllers={"u": lambda t, x: float("nan")})
     with refused("EG-UNSUPPORTED none"):
         eg.load_example("pendulum").compile(target="numpy").simulate(1.0, controllers={"u": lambda t, x: 0.0})
-
-
-def test_ida_samples_too(module: Any) -> None:
-    pytest.importorskip("sksundae")
-    run = module.dae.solve((0.0, 1.05), rtol=1e-9, atol=1e-11)
-    assert np.abs(run.x[:4, -1] - by_hand(1.05, 0.1 * np.arange(11))).max() < 1e-6
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -196,19 +196,6 @@ def test_a_failure_at_the_start_is_no_simulation_error(swing: eg.Module, rooted:
         rooted.simulate(1.0, {"x": 2.0})
 
 
-@pytest.mark.parametrize("target", TARGETS)
-def test_unbounded_motion_is_named(target: str) -> None:
-    m = eg.Model("burst")
-    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
-    m.torque("push", "J", "2*s**3")  # s = 1/(1 - t) from s = s' = 1
-    refuses("EG-STALLED", lambda: m.compile(target=target).simulate(3.0, {"s": 1.0, "s_dot": 1.0}))
-
-
-def test_an_initial_array_is_projected(crank: eg.Module) -> None:
-    run = crank.simulate(0.05, crank.x0() + 1e-4)
-    assert np.abs(crank.constraints(run.x[:3, 0])).max() < 1e-13
-
-
 def test_progress_goes_to_stderr_only_when_requested(swing: eg.Module, capsys: pytest.CaptureFixture[str]) -> None:
     swing.simulate(20.0, {"theta": 2.0}, rtol=1e-11, atol=1e-12, progress=True)
     shown = capsys.readouterr()

@@ -6,7 +6,6 @@
 import json
 import os
 import re
-import shutil
 import signal
 import sys
 import time
@@ -240,18 +239,6 @@ def test_messages_name_options_not_arguments_of_python(call: Call, tmp_path: Pat
     assert "limits='stop'" not in told
 
 
-def test_values_of_set_are_judged_as_declared_ones(call: Call, tmp_path: Path) -> None:
-    text = (
-        "name: dropped\nparameters: {r: 0.1, mu: 0.3}\nbodies: {ball: {mass: 1, inertia: {zz: 0.1}}}\n"
-        "joints: {J: {type: planar, between: [ground, ball], coordinates: [x, y, phi]}}\nforces:\n"
-        "  floor: {type: contacts, first: [{shape: circle, on: ball, radius: r}], second: [{shape: half_plane, "
-        "on: ground}],\n    stiffness: 1.0e+4, friction: mu, smoothing: 0.01}\nsimulation: {end: 0.01}\n"
-    )
-    found = call("run", model_file(tmp_path, text), *NUMPY, "--set", "r=-0.1", "--set", "mu=-1")
-    expect(found, 1, "forces.floor.first[0].radius: is -0.1 with r = -0.1; must be greater than 0")
-    expect(found, 1, "forces.floor.friction: is -1 with mu = -1; must be 0 or greater")
-
-
 def test_files_that_cannot_be_written_are_reported_before_the_work(call: Call, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.npz").mkdir()
@@ -470,14 +457,6 @@ def test_explain_writes_the_worked_solution(call: Call, tmp_path: Path) -> None:
     assert r"2 \cdot 20 \dot{\mathbf{C}} + 10^2 \mathbf{C}" in (tmp_path / "held.md").read_text(encoding="utf-8")
 
 
-def test_generate_writes_packages(call: Call, tmp_path: Path) -> None:
-    for target in ("cython", "c"):
-        words = ("generate", PENDULUM, "--target", target, "--json", "--out")
-        written = call(*words, "again").json  # nothing of the target before is left
-        assert written["files"] == call(*words, target).json["files"]
-        assert all((tmp_path / "again" / "pendulum" / name).is_file() for name in written["files"])
-
-
 def test_examples_are_listed_and_copied_and_never_overwritten(call: Call, tmp_path: Path) -> None:
     listed = call("examples", "--json").json["examples"]
     assert {frozenset(entry) for entry in listed} == {frozenset({"name", "file", "doc"})}
@@ -505,21 +484,3 @@ def test_every_example_runs(call: Call) -> None:
     for entry in told.json["examples"]:
         assert entry["ok"], entry
         assert entry["steps"] > 0 or entry["file"].endswith(".py")
-
-
-def test_the_cache_is_listed_pruned_and_cleared(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = Path(os.environ["EOMGEN_CACHE_DIR"])
-    call("run", PENDULUM, "--end", "0.1")
-    shutil.copytree(before, tmp_path / "cache", ignore=shutil.ignore_patterns("*.lock"))
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "nothing"))
-    assert call("cache", "list", "--json").json["entries"] == []
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
-    full = call("cache", "list", "--json").json
-    assert "pendulum" in {entry["name"] for entry in full["entries"]}
-    keys = {"key", "kind", "name", "directory", "size", "created", "used"}
-    assert {frozenset(entry) for entry in full["entries"]} == {frozenset(keys)}
-    assert "pendulum" in call("cache").out
-    assert call("cache", "prune", "--json").json["removed"] == []
-    pruned = call("cache", "prune", "--max-size", "0", "--json").json
-    assert (set(pruned["removed"]), pruned["freed"]) == ({entry["key"] for entry in full["entries"]}, full["size"])
-    assert call("cache", "clear", "--json").json["removed"] == 0

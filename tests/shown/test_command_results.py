@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from models import EXAMPLES
 from PIL import Image
-from sweeps import part_of
 
 import eomgen as eg
 
@@ -19,10 +18,6 @@ Call = Callable[..., command.Result]
 NUMPY = ("--target", "numpy")
 CRANK, FOUR_BAR, PENDULUM = (EXAMPLES / f"{name}.yaml" for name in ("slider_crank", "four_bar", "pendulum"))
 DOUBLE = EXAMPLES / "double_pendulum.yaml"
-MODELS = sorted(EXAMPLES.glob("*.yaml"))
-#: Largest change of a coordinate (rad, m) that a run must make where it is less than 1; these stand on springs.
-TRAVEL = {"car_axis": 0.15, "kapitza_pendulum": 0.35, "double_wishbone": 0.4, "half_car": 0.06, "gait_leg": 0.6}
-TRAVEL["hydraulic_boom"] = 0.35
 
 
 @pytest.fixture
@@ -72,20 +67,10 @@ def test_solver_method_and_partition_reach_the_run(call: Call) -> None:
     assert settings == {"method": "Radau", "rtol": 1e-4, "atol": 1e-6}
     assert coarse["integration"]["jacobians"] > 0
     assert 1e-9 < abs(coarse["final"]["theta"] - one["final"]["theta"]) < 1e-2  # the tolerance reaches the integrator
+    steps = call(*words, "--solver", "rk4", "--step", "0.01").json
+    assert (steps["integration"]["method"], steps["integration"]["steps"]) == ("RK4", 30)
     held = call(*words, "--method", "augmented", "--baumgarte", "20,20").json
     assert held["final"]["theta"] == pytest.approx(one["final"]["theta"], abs=1e-5)
-
-
-@pytest.mark.parametrize("path", part_of(MODELS, lambda path: False), ids=lambda path: path.stem)
-def test_examples_move_and_keep_their_energy(call: Call, tmp_path: Path, path: Path) -> None:
-    run = call("run", path, "--json", "--out", "run.npz").json
-    trajectory = eg.load_trajectory(tmp_path / "run.npz")
-    travel = max(np.ptp(trajectory[name]) for name in run["report"]["coordinates"])
-    driven = "type: driver" in path.read_text(encoding="utf-8")
-    assert travel > TRAVEL.get(path.stem, 1.0)
-    assert run["loop_residual"]["projected"] < 1e-10
-    balance = run["energy"]["power_balance"]
-    assert balance is None if driven else balance < 1e-7
 
 
 def yaml(folder: Path, text: str) -> Path:
@@ -246,12 +231,6 @@ def test_impact(call: Call, tmp_path: Path) -> None:
     np.testing.assert_allclose(found["friction"]["gap"], [-0.3 * 1.4 * 0.5 * 2])
     np.testing.assert_allclose(found["sliding_after"]["gap"], [1 - 0.3 * 1.4 * 0.5])
     assert "friction of gap  impulse -0.42, sliding 1 -> 0.79" in call(*words).out
-
-
-def test_verify_of_a_right_model_ends_with_0(call: Call) -> None:
-    found = call("verify", PENDULUM, *NUMPY, "--json")
-    assert found.code == 0, found.err
-    assert found.json["ok"] is True
 
 
 # -- kinematics -------------------------------------------------------------------------------------------------------

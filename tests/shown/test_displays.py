@@ -284,11 +284,8 @@ def test_displays_fit_a_page(tmp_path: Path) -> None:
     with Browser(tmp_path / "profile", size=(960, 800)) as browser:
         for name in ("double_pendulum", "cart_pendulum", "slider_crank", "four_bar", "rolling_disc", "bicycle"):
             page = tmp_path / f"{name}.html"
-            page.write_text(
-                f"<!doctype html><meta charset='utf-8'><body style='width:900px;font:14px sans-serif'>"
-                f"{derived(name)._repr_html_()}",
-                encoding="utf-8",
-            )
+            head = "<!doctype html><meta charset='utf-8'><body style='width:900px;font:14px sans-serif'>"
+            page.write_text(head + derived(name)._repr_html_(), encoding="utf-8")
             browser.open(page.as_uri())
             browser.wait_for(f"document.readyState === 'complete' && document.body.textContent.includes('{name}')")
             assert max(browser.evaluate(sizes)) <= browser.evaluate("document.body.getBoundingClientRect().right"), name

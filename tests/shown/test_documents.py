@@ -102,9 +102,7 @@ def test_functions_of_the_reference_say_what_they_take() -> None:
     named = re.findall(r"autofunction:: (\S+)", "".join(p.read_text() for p in (DOCS / "reference").glob("*.md")))
     assert named
     for function in map(pkgutil.resolve_name, named):
-        assert not inspect.signature(function).parameters or "Parameters\n" in (inspect.getdoc(function) or ""), (
-            function
-        )
+        assert not inspect.signature(function).parameters or "Parameters\n" in (inspect.getdoc(function) or "")
 
 
 SCRIPTS = {
@@ -194,9 +192,8 @@ def test_the_gallery_has_every_example_and_no_picture_besides() -> None:
     text = (DOCS / "gallery.md").read_text(encoding="utf-8")
     listed = {entry["file"] for entry in command.run("examples", "--json").json["examples"]}
     assert {name for name in listed if f"{Path(name).name}" not in text and Path(name).stem not in text} == set()
-    assert set(re.findall(r"pictures/gallery/([^)]+)\)", text)) == {
-        file.name for file in (DOCS / "pictures" / "gallery").iterdir()
-    }
+    stored = {file.name for file in (DOCS / "pictures" / "gallery").iterdir()}
+    assert set(re.findall(r"pictures/gallery/([^)]+)\)", text)) == stored
 
 
 @pytest.mark.slow

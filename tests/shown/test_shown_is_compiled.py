@@ -4,6 +4,7 @@ All examples with the method that is chosen for them; every method with one exam
 with force elements, rolling (nonholonomic), motion over time, Euler parameters.
 """
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -108,13 +109,11 @@ def test_of_every_example(name: str) -> None:
     compare_bodies(c)
 
 
-@pytest.mark.parametrize(
-    ("name", "method"),
-    part_of(
-        [(name, method) for name in KINDS for method in OTHERS],
-        lambda pair: pair[0] == "slider_crank" or pair == ("rolling_disc", "lagrange"),
-    ),
-)
+def often(pair: tuple[str, str]) -> bool:
+    return pair[0] == "slider_crank" or pair == ("rolling_disc", "lagrange")
+
+
+@pytest.mark.parametrize(("name", "method"), part_of(product(KINDS, OTHERS), often))
 def test_of_every_method(name: str, method: str) -> None:
     compare_motion(Compared(name, method))
 
@@ -164,13 +163,10 @@ def test_momenta_and_their_rates_are_those_of_the_canonical_form(name: str) -> N
     agree(rates, form.rhs(0.0, form.of(c.x))[c.module.n_q :])
 
 
-@pytest.mark.parametrize(
-    ("name", "method"),
-    part_of(
-        [(n, m) for n in ("slider_crank", "rolling_disc", "spatial_four_bar") for m in ("newton_euler", "amalgamated")],
-        lambda pair: pair[0] == "slider_crank",
-    ),
-)
+FREE = product(("slider_crank", "rolling_disc", "spatial_four_bar"), ("newton_euler", "amalgamated"))
+
+
+@pytest.mark.parametrize(("name", "method"), part_of(FREE, lambda pair: pair[0] == "slider_crank"))
 def test_free_bodies_hold_at_the_compiled_accelerations(name: str, method: str) -> None:
     """Reactions that balance all bodies exist there, and at no other accelerations."""
     c = Compared(name, method, 3)
@@ -228,12 +224,10 @@ def test_reactions_balance_a_drive_with_inertia(cut: str, method: str) -> None:
 # -- near a state -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "name",
-    part_of(
-        ("slider_crank", "rolling_disc", "satellite", "cart_pendulum", "half_car"), lambda name: name != "half_car"
-    ),
-)
+NEAR = ("slider_crank", "rolling_disc", "satellite", "cart_pendulum", "half_car")
+
+
+@pytest.mark.parametrize("name", part_of(NEAR, lambda name: name != "half_car"))
 def test_equations_near_a_state_are_those_of_the_module(name: str) -> None:
     c = Compared(name, seed=3)
     near = c.equations.linearize(at={name: name for name in c.module.v_names})  # velocities stay symbols
@@ -257,13 +251,10 @@ def test_equations_with_nonholonomic_constraints_alone_near_a_state() -> None:
 # -- large loops, shown by their parts --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "name",
-    part_of(
-        ("bicycle", "watt_six_bar", "andrews_squeezer", "delta_robot", "double_wishbone", "excavator"),
-        lambda name: name in ("bicycle", "watt_six_bar"),
-    ),
-)
+LARGE = ("bicycle", "watt_six_bar", "andrews_squeezer", "delta_robot", "double_wishbone", "excavator")
+
+
+@pytest.mark.parametrize("name", part_of(LARGE, LARGE[:2].__contains__))
 def test_parts_of_a_tree_give_the_accelerations_of_the_module(name: str) -> None:
     c = Compared(name, seed=5)
     named, system = c.equations.written("tree_system")

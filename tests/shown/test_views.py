@@ -382,9 +382,8 @@ def test_a_bare_lagrangian(method: str) -> None:
     """A bead on a hoop that turns at W: T_0 counts to V as L at rest has it."""
     phi, rate, m, r, W, g, b = sp.symbols("phi phi_dot m r W g b")
     L = m * r**2 * (rate**2 + W**2 * sp.sin(phi) ** 2) / 2 + m * g * r * sp.cos(phi)
-    model = eg.Model.from_lagrangian(
-        "hoop", L, [phi], dissipation=b * rate**2 / 2, parameters={m: 1, r: 1, W: 2, g: 9, b: 1}
-    )
+    values = {m: 1, r: 1, W: 2, g: 9, b: 1}
+    model = eg.Model.from_lagrangian("hoop", L, [phi], dissipation=b * rate**2 / 2, parameters=values)
     equations = model.derive(method)
     assert sp.simplify(equations.lagrangian - L) == 0
     assert sp.simplify(equations.T - m * r**2 * rate**2 / 2) == 0
