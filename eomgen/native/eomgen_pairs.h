@@ -342,7 +342,7 @@ static void call_parts(const pair_kind *kind, int called, const double *a, const
 
 EOMGEN_INSIDE void call_law(const pair_kind *kind, int called, const double *a, const double *b, const double *law, double *out)
 {
-    if ((POLYGONS || OUTLINES) && kind->corners[0]) {
+    if (kind->corners[0] != 0 && POLYGONS + OUTLINES > 0) {
         call_parts(kind, called, a, b, law, out);
     } else {
         call_pair(called, a, b, law, out);

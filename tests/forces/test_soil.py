@@ -286,6 +286,17 @@ def by_quadrature(law: dict[str, Any], depth: float, forward: float, spin: float
     )
 
 
+@pytest.mark.parametrize("n", [0.2, 0.8, 1.6])
+def test_compaction_resistance_of_bekker(n: float) -> None:
+    """R_c = b k z^(n+1) / (n+1), the work that presses a rut of the depth z; at any depth of the wheel."""
+    law = {**SMOOTH, "sinkage_exponent": n}
+    mod = wheel(law).compile(target="numpy")
+    for depth in (0.002, 0.03, 0.2):
+        along, _, moment = forces(mod, depth, 1.0, 2.0)
+        assert -along == pytest.approx(B * stiffness(law) * depth ** (n + 1) / (n + 1), rel=1e-4)
+        assert abs(moment) < 1e-6
+
+
 @pytest.mark.parametrize("n", [0.2, 0.5, 1.0, 1.6])
 def test_sinkage_of_bekker(n: float) -> None:
     """W = b k z^n sqrt(z D) I, I = (3 - n) / 3 of Bekker, exact for n = 1; else B(1/2, n+1) / 2."""

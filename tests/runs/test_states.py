@@ -355,6 +355,15 @@ def test_sensitivities_go_through_resets_of_states() -> None:
         np.testing.assert_allclose([found[name, by][-1] for name in ("s", "s_dot", "a")], slope, atol=2e-5)
 
 
+def test_many_runs_are_single_runs() -> None:
+    mod = lag_module(events=True)
+    taus, starts = np.array([0.4, 0.5, 0.6, 0.7, 0.9]), np.array([0.1, 0.2, 0.3, 0.05, 0.0])
+    many = mod.simulate_many(3.0, parameters={"tau": taus}, initial={"a": starts})
+    for k, (tau, a) in enumerate(zip(taus, starts, strict=True)):
+        single = mod.simulate(3.0, parameters={"tau": tau}, initial={"a": a}).x[:, -1]
+        np.testing.assert_allclose(many.x[:, k], single, rtol=0.0, atol=1e-8)
+
+
 def test_a_driven_mechanism_integrates_its_states() -> None:
     """s = 0.1 sin 3 t is prescribed; a' = s' - 4 a has a closed form."""
     m = eg.Model("driven")
