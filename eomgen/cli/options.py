@@ -551,9 +551,10 @@ def _missing(path: Path) -> str:
     if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
-    names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
-    near = closest(path.name, names)
-    return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
+    found = [p for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
+    files = {p.stem: p for p in sorted(found, key=lambda p: p.suffix == path.suffix)}  # of one stem, the last
+    near = closest(path.stem, files)
+    return f"{path}: no such file" + (f"; did you mean {files[near[0]]}?" if near else "")
 
 
 def _sort_settings(module: Module, settings: dict[str, float]) -> Iterator[dict[str, float] | None]:
