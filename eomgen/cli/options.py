@@ -551,10 +551,10 @@ def _missing(path: Path) -> str:
     if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
-    found = [p for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
-    files = {p.stem: p for p in sorted(found, key=lambda p: p.suffix == path.suffix)}  # of one stem, the last
-    near = closest(path.stem, files)
-    return f"{path}: no such file" + (f"; did you mean {files[near[0]]}?" if near else "")
+    files = [p for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
+    stems = {p.stem: p for p in sorted(files, key=lambda p: p.suffix == path.suffix)}  # of one stem, the last
+    near = closest(path.stem, stems)
+    return f"{path}: no such file" + (f"; did you mean {stems[near[0]]}?" if near else "")
 
 
 def _sort_settings(module: Module, settings: dict[str, float]) -> Iterator[dict[str, float] | None]:
