@@ -443,7 +443,7 @@ def derivatives(report: Report, quick: bool) -> None:
 # -- closed loops ------------------------------------------------------------------------------------------------------
 #: MuJoCo with as small a residual as its solver reaches: until nothing changes, or so many iterations.
 STRICT, ITERATIONS, LINE_SEARCH = "MuJoCo, tolerance 0", 100, 1e-10
-#: Of Pinocchio's proximal solver: tolerances, regularisation, steps; its residuals come nearest to ours with these.
+#: Of Pinocchio's proximal solver: tolerances, regularization, steps; its residuals come nearest to ours with these.
 PROXIMAL = (1e-12, 1e-12, 1e-10, 20)
 BESIDE = 1e-9  #: by how much positions are off the loops where ours steps onto them, as in an integrator
 

@@ -432,7 +432,7 @@ def after_reset(
     if layout.space is not None:
         for i, _ in layout.quaternion_slots:
             dq[i : i + 4] /= np.linalg.norm(star[i : i + 4])
-        star[:n_q] = layout.space.normalised(star[:n_q])
+        star[:n_q] = layout.space.normalized(star[:n_q])
         dq = dq - layout.space.stretch(star[:n_q], dq)
     if not layout.n_c:
         return np.vstack([dq, dv])

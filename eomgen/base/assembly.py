@@ -96,7 +96,7 @@ Q = TypeVar("Q")  #: a position, as the system has it
 def close(
     system: Any, q: Q, steps: int = STEPS, damping: float | None = DAMPING, metric: Array | None = None
 ) -> tuple[Q, float]:
-    """Minimise the scaled residual of a :class:`ClosureSystem`, or of equations with the same calls, from q.
+    """Minimize the scaled residual of a :class:`ClosureSystem`, or of equations with the same calls, from q.
 
     Damping at first: 0 where q is near a closed position, so that directions that hardly count do not creep; None for
     steps of least squares, which keep all digits beside singular positions and may lead far away from them.  Steps are

@@ -244,7 +244,7 @@ class HeldPath:
         for damping in (0.0, DAMPING):
             result, residual = close(system, q, steps=NEWTON, damping=damping)
             if closed(residual):
-                result[self.held] = q[self.held]  # Euler parameters are normalised at each step
+                result[self.held] = q[self.held]  # Euler parameters are normalized at each step
                 return Point(s, result, self.tangent(s, result))
         return None
 

@@ -95,7 +95,7 @@ static void spread(const eom_at *at, const double *restrict q, const double *res
 }
 
 /* Euler parameters of length 1. */
-static void normalise(const eom_at *at, double *restrict q)
+static void normalize(const eom_at *at, double *restrict q)
 {
     (void)at;
     for (int b = 0; b < QUATERNIONS && MODEL->rates == NULL; b++) {

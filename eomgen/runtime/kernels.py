@@ -156,7 +156,7 @@ class Kernels:
             n = layout.inputs(name)
             return self.derived(name, kind, lambda *x, **_: np.zeros((*result, *batch_of(x, n))), choose)
         if not layout.n_c and name == "project":
-            return self.derived(name, kind, self._normalised)
+            return self.derived(name, kind, self._normalized)
         if not layout.rank and name == "embedded_mass_matrix":
             every = _places((layout.n_v, layout.n_v))[np.ix_(layout.independent, layout.independent)]
             return self.kernel("mass_matrix", nan, kind, every if pick is None else every.ravel()[pick])
@@ -200,7 +200,7 @@ class Kernels:
             self.kernel(name)(t, x, u=u)  # tells what is wrong
         return result
 
-    def _normalised(self, x: Any, **raw: Any) -> Array:
+    def _normalized(self, x: Any, **raw: Any) -> Array:
         """The projection of a tree: nothing to do but for the length of Euler parameters."""
         result = np.array(read_numbers("x", x))
         batch_of((result,), self.layout.n_x)

@@ -359,7 +359,7 @@ def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -
 
 
 Arrays = dict[str, Any]
-GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depend on blocks, threads or workers
+GRAIN = 256  #: runs summarized at a time; fixed, so that rounding does not depend on blocks, threads or workers
 
 
 class Reduction:
@@ -401,7 +401,7 @@ class Statistics(Reduction):
         grains = []
         values = [runs.with_outputs(states[:, j], t) for j, t in enumerate(when)]
         for start in range(0, max(runs.count, 1), GRAIN):
-            parts = [summarise(x[:, start : start + GRAIN]) for x in values]
+            parts = [summarize(x[:, start : start + GRAIN]) for x in values]
             grains.append(stacked(parts, -1))
         return stacked(grains, 0)
 
@@ -452,7 +452,7 @@ def choose_reduction(reduce: Any) -> Reduction:
     raise no_choice(f"{WANTED}, not {reduce!r}")
 
 
-def summarise(values: Array) -> Arrays:
+def summarize(values: Array) -> Arrays:
     """Count, mean, sum of squared deviations, least and greatest (n,) over what is finite in each row."""
     finite = np.isfinite(values)
     count = finite.sum(axis=1)

@@ -52,7 +52,7 @@ from .block import (
     run_block,
     split,
     stored_length,
-    summarise,
+    summarize,
 )
 from .variations import collect_variations, grid_axes, spread_grid
 
@@ -208,9 +208,9 @@ class Ensemble(Result):
         if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
-            raise cannot("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
+            raise cannot("this ensemble kept no states to summarize; run it with reduce='states' or 'statistics'")
         else:
-            parts = summarise(self._runs.with_outputs(self.x, self.t_end))
+            parts = summarize(self._runs.with_outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
             rows = [parts["mean"], spread, parts["least"], parts["greatest"]]
         keys = ("mean", "deviation", "least", "greatest")

@@ -244,7 +244,7 @@ class ChangePointInterpolant:
         space = self.scales.space
         if space is None:
             return q, first, second
-        return space.normalised(q), space.velocities(q, first), space.velocities(q, second)
+        return space.normalized(q), space.velocities(q, first), space.velocities(q, second)
 
 
 def build_interpolant(
