@@ -75,7 +75,7 @@ class Muscle(PathForce):
 
     sentence = (
         "A muscle with a rigid tendon pulls the ends of its path together; $a$ is the activation, $l$ and "
-        r"$\dot{l}$ the length of its fibres and its rate, normalized."
+        r"$\dot{l}$ the length of its fibres and its rate, normalised."  # codespell:ignore normalised
     )
     formula = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
     uses_value = True
