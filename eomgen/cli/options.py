@@ -143,7 +143,7 @@ def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ..
 
 
 def require_folder(option: str, file: Path | None, exists: bool = False) -> None:
-    """Fail before the work if a file cannot be written where it is asked for; makes nothing.
+    """Fail before the work if a file cannot be written where it is requested; makes nothing.
 
     Its folder is made when it is written, unless it has to exist.
     """

@@ -160,7 +160,7 @@ OF_TREES: Mapping[str, Expressions] = {
 
 
 class BlockMaker:
-    """Makes the blocks of one system, each when it is asked for."""
+    """Makes the blocks of one system, each when it is requested."""
 
     def __init__(self, terms: SystemTerms, limits: Limits) -> None:
         self.terms, self.limits = terms, limits

@@ -48,14 +48,14 @@ class PrintedQuantity(NamedTuple):
 class Author:
     """Writes the quantities of equations as pieces of a document, on request only the equations of motion.
 
-    ``source`` is what was derived, of which the equations may be a view, ``put_in`` the parameters and inputs for which
-    values were put in, and these; None where other parameters leave them open.
+    ``source`` is what was derived, of which the equations may be a view, ``substituted`` the values of parameters and
+    inputs that stand for them; None where other parameters leave them open.
     """
 
     def __init__(self, equations: Any, full: bool) -> None:
         self.equations, self.full = equations, full
         self.source: Any = equations.source if isinstance(equations, ReadingView) else equations
-        self.put_in: Mapping[str, float | None] = equations.numbers_substituted()
+        self.substituted: Mapping[str, float | None] = equations.numbers_substituted()
         self.mechanism = equations.kinematics.mechanism
         self.names: Notation = equations.notation
         self._formula = Formulas(order_of(equations), digits=ROUNDED)

@@ -163,9 +163,9 @@ def explain(equations: Any, level: str = "full") -> Explanation:
     result = None if module is None else compare(author, module)
     sections += [*map(_folded, details), final, *map(_folded, numbers), about.difference(result, reason)]
     title = f"Equations of motion of `{equations.name}`, method `{equations.method}`"
-    if author.put_in:
-        values = ("open" if x is None else f"{x:.6g}" for x in author.put_in.values())
-        title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.put_in, values, strict=True))}"
+    if author.substituted:
+        values = ("open" if x is None else f"{x:.6g}" for x in author.substituted.values())
+        title += f", with {', '.join(f'`{n}` = {x}' for n, x in zip(author.substituted, values, strict=True))}"
     kept = [section for section in sections if section is not None]
     return Explanation(title, kept, author.names, None if result is None else result.largest)
 
@@ -186,7 +186,7 @@ def _module(author: Author) -> tuple[Any, str]:
 
     k = equations.kinematics
     try:
-        values = {name: value for name, value in author.put_in.items() if value is not None}
+        values = {name: value for name, value in author.substituted.items() if value is not None}
         p, u = ({n: values[n] for n in names if n in values} for names in (k.parameter_names, k.input_names))
         module = BoundModel(compile_core(equations, "numpy"), p or None, u or None)
         module.x0()

@@ -124,9 +124,9 @@ def bodies(author: Author) -> Section | None:
             (
                 f"${author.symbol(p.name)}$",
                 f"`{p.name}`",
-                _value(author.put_in.get(p.name, p.value)),
+                _value(author.substituted.get(p.name, p.value)),
                 _plain(p.unit),
-                (_plain(p.doc) or kind) + (", value put in" if p.name in author.put_in else ""),
+                (_plain(p.doc) or kind) + (", value put in" if p.name in author.substituted else ""),
             )
             for p, kind in symbols
         )
@@ -414,7 +414,7 @@ def _weight(author: Author, name: str) -> list[Piece]:
     """Gravity, and other parts that are no elements."""
     for switch in author.mechanism.switched:
         if switch.constraint is not None and switch.constraint.name == name:
-            return _held(author, name, switch)
+            return _switched(author, name, switch)
     if name != "gravity":
         return [Sentence(f"`{name}` of the model.")]
     gravity = author.write("gravity", list(author.mechanism.gravity)).expressions
@@ -427,7 +427,7 @@ def _weight(author: Author, name: str) -> list[Piece]:
     ]
 
 
-def _held(author: Author, name: str, switch: Switched) -> list[Piece]:
+def _switched(author: Author, name: str, switch: Switched) -> list[Piece]:
     """What a constraint that closes and opens demands, and when."""
     assert switch.constraint is not None
     events = {event.name: event for event in author.mechanism.events}
@@ -475,7 +475,7 @@ def calculation(author: Author, state: Mapping[str, float], reason: str, moved: 
     rows = tuple(
         (f"${author.symbol(name)}$", f"{state[name]:.6g}")
         for name in names
-        if name in state and name not in author.put_in
+        if name in state and name not in author.substituted
     )
     numbers = dict(state)
     pieces: list[Piece] = [

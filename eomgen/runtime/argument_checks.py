@@ -282,7 +282,7 @@ def _unknown(what: str, names: Iterable[object], allowed: Iterable[str], place: 
 def find_lacking(one: object, kind: str, name: str) -> Any:
     """What ``__getattr__`` of a class has to say of an attribute that Python did not find.
 
-    Names that begin with an underscore are asked for by copy, pickle and notebooks, and are looked up nowhere.
+    Names that begin with an underscore are requested by copy, pickle and notebooks, and are looked up nowhere.
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)

@@ -22,7 +22,7 @@ from ...errors import UsageError, bad_data, cannot, ill_typed, no_choice, off_ra
 from ..argument_checks import check_names, require, require_size, unknown, without_dots
 from ..identity import code_digest, digest, origin, plain, spell_input
 from ..inputs import Forcing, Signal, fill_rates, rate_pairs
-from ..kernels import WORDS, place
+from ..kernels import CAUSES, place
 from ..plotting import printed_names
 from ..refusals import refuse_moreau, require_support
 from ..runs.bound_run import Progress, wanted
@@ -109,7 +109,7 @@ class Ensemble(Result):
     samples : (n_x, m, k) array or None
         States at ``t``.
     t : (m,) array
-        Times asked for; the end of the span where none were.
+        Times requested; the end of the span where none were.
     t_end : (k,) array
         How far each run came (s).
     status : (k,) int array
@@ -160,7 +160,7 @@ class Ensemble(Result):
         status, code = int(self.status[k]), int(self._failure[k])
         message = self._messages.get(k) or MEANING.get(status, f"status {status}")
         if code and k not in self._messages:
-            reason = WORDS.get(code, (f"status {code}",))[0]
+            reason = CAUSES.get(code, (f"status {code}",))[0]
             message += f"; last failure near t = {self._failure_time[k]:.6g} s: {reason}"
         return Failure(k, status, float(self.t_end[k]), message, {name: float(row[k]) for name, row in varied.items()})
 
