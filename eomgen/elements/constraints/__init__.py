@@ -10,4 +10,5 @@ CONSTRAINTS = TypeTable(
     rolling="rolling knife_edge",
     drivers="driver",
     switching="hold lock",
+    levels="level",
 )
