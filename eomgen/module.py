@@ -27,7 +27,6 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "verify": "verify.verify",
     "linearize": "analysis.linear",
     "modes": "analysis.modes",
-    "wobble": "analysis.wobbles",
     "equilibrium": "analysis.equilibrium",
     "sensitivities": "analysis.sensitivities",
     "fit": "analysis.fit",

@@ -96,7 +96,6 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("inverse_dynamics_derivatives", ("q", "v", "a"), lambda s: (s.n_v, s.n_q + 2 * s.n_v),
            "M a + h by [q, v, a], each at fixed others; by a it is M", lazy="inverse dynamics"),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
-    Kernel("power_of_gravity", ("q", "v"), lambda s: (1,), "rate at which the potential energy falls (W)"),
     Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, lazy=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),

@@ -368,12 +368,6 @@ ROWS = (
         recurrence=lambda g, y, a: ((g.one.id,), _one_and(g, "add", a)),
     ),
     function(
-        "cbrt", math.cbrt, np.cbrt, (lambda g, y, a: over(g, g.mul(g.constant(3.0).id, g.mul(y, y))),),
-        (lambda y, a: 1.0 / (3.0 * y * y),), parity=ODD, fragile=True,
-        recurrence=lambda g, y, a: ((over(g, g.mul(g.constant(3.0).id, g.mul(y, y))),), None),
-        sympy=lambda s, a: s.cbrt(a),
-    ),
-    function(
         "sinh", math.sinh, np.sinh, (lambda g, y, a: g.make("cosh", a),), (lambda y, a: np.cosh(a),),
         parity=ODD, analytic=True, fragile=True,
     ),

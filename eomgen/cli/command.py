@@ -22,7 +22,6 @@ VERBS = {
     "view": ("runs", "Show how a mechanism moves, in a browser or as a file."),
     "kinematics": ("runs", "Analyse the motion over a range, without forces."),
     "check": ("models", "Report a model's topology, mobility and errors."),
-    "size": ("models", "Print how many bodies and joints a model has."),
     "derive": ("models", "Derive the equations of motion and count their operations."),
     "explain": ("models", "Write the worked solution: every step to the equations, then numbers."),
     "linearize": ("analyses", "Linearize a model: A, B, C, D, eigenvalues."),

@@ -87,16 +87,6 @@ def convert(source: Source, out: Annotated[Path | None, "FILE: Write to FILE.yam
         click.echo(text, nl=False)
 
 
-@verb()
-def size(source: Source, bodies: Annotated[bool, "Also list the bodies."] = False) -> None:
-    """Print how many bodies and joints a model has."""
-    mechanism = source.load().mechanism()
-    names = [body.name for body in mechanism.bodies]
-    values = {"name": mechanism.name, "bodies": names, "joints": len(mechanism.joints)}
-    lines = [f"{len(names)} bodies, {len(mechanism.joints)} joints", *(names if bodies else ())]
-    source.show(values, "\n".join(lines))
-
-
 @verb(DERIVED)
 def derive(
     source: Source,

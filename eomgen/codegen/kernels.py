@@ -122,7 +122,6 @@ EXPRESSIONS: Mapping[str, Expressions] = {
     "bias": lambda s: s.bias,
     "inverse_dynamics": lambda s: s.inverse_dynamics,
     "energy": lambda s: (s.kinetic, s.potential),
-    "power_of_gravity": lambda s: [-x for x in jvp([s.potential], dict(zip(s.symbols(s.q), s.q_dot, strict=True)))],
     "centroidal": lambda s: s.centroidal,
     "constraints": lambda s: s.constraints,
     "constraint_jacobian": lambda s: flat(s.constraint_jacobian),

@@ -16,7 +16,7 @@ from ..expr.differentiate import jvp
 from ..expr.vectors import Mat3, Vec3
 from . import kinds
 from .constraints.constraint import SWITCHING
-from .dimensions import ENERGY, LENGTH, NONE, REACH, TIME
+from .dimensions import ENERGY, LENGTH, REACH, TIME
 from .element_type import Element, ElementType, key, keys_of, table
 from .glyphs import JointLook, SymbolPart
 from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
@@ -836,41 +836,13 @@ def joint(kind: type[Joint]) -> ElementType:
     return ElementType(kind.type_name, doc, kind.keys(), ends=("predecessor", "successor"), kind=kind)
 
 
-class Slanted(Joint):
-    """S slides along z and, by ``slope``, along x of P, without turning.  Allows 1, removes 5."""
-
-    sentence = "S slides on a slope of P, without turning."
-    formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q (\mathbf{e}_{z} + m \mathbf{e}_{x})"
-    look = JointLook((SymbolPart("box", (2.0, 2.0, 2.0)),))
-    coordinates = (Coordinate("", "length"),)
-    slope: Expr = key(Scalar("x for each z", required=True, dimension=NONE))
-
-    def _along(self, graph: Graph) -> Vec3:
-        return (self.slope, graph.zero, graph.one)
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return vec.identity(graph), vec.scale(q[0], self._along(graph))
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(vec.zero(graph), self._along(graph))]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        aside = [position[0] - self.slope * position[2], position[1]]
-        turned = [rotation[0][2], rotation[1][2], rotation[1][0]]
-        rows = [*((x, "length") for x in aside), *((x, "angle") for x in turned)]
-        return [Closure(label, *row) for label, row in zip(("x", "y", "zx", "zy", "xy"), rows, strict=True)]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [position[2]]
-
-
 JOINTS = table(
     *map(
         joint,
         (
             *(Revolute, Continuous, Prismatic, Screw, Cylindrical, Planar, Translational, Weld, Universal),
             *(ConstantVelocity, Spherical, Free, CurveSlider, SurfaceSlider, PointOnCurve, PointOnSurface, Distance),
-            *(Slanted, RevoluteSpherical, Inline, Inplane, Parallel, Perpendicular, Orientation),
+            *(RevoluteSpherical, Inline, Inplane, Parallel, Perpendicular, Orientation),
         ),
     )
 )

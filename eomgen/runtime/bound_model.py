@@ -55,7 +55,6 @@ class BoundModel:
     mass_matrix: State
     embedded_mass_matrix: State
     energy: State
-    power_of_gravity: State
     project: Projection
     poses: State
     inverse_dynamics: Motion

@@ -99,7 +99,6 @@ TARGETS: dict[str, Target] = {
         whole="codegen.targets.fmu.generate_fmu",
         kernels=FMU_KERNELS,
     ),
-    "sizes": Target("page that lists operations", "codegen.targets.sizes.package"),
     "web": Target("page in which the mechanism runs, one file", whole="codegen.targets.web.generate_web"),
 }
 

@@ -377,9 +377,3 @@ def test_laws_of_pairs_are_short(tmp_path: Path) -> None:
     )
     shared = [law for name, law in laws.items() if re.search("edge_axis_|rod_rounded_corner_", name)]
     assert sum(0 < law.find("EOMGEN_REJECT(0.0 >= ") < 0.15 * len(law) for law in shared) >= 2
-
-
-def test_a_page_of_sizes(tmp_path: Path) -> None:
-    generate(models.build("double_pendulum"), tmp_path, target="sizes")
-    (page,) = tmp_path.rglob("README.md")
-    assert "| `rhs` |" in page.read_text()

@@ -50,7 +50,6 @@ SMOOTH: dict[str, tuple[Any, tuple[float, float]]] = {
     "acos(x)": (sp.acos(X), (0.4, 1.3)),
     "atan(x)": (sp.atan(X), (-2.7, 0.3)),
     "atan2(x, y)": (sp.atan2(X, Y), (0.7, -1.3)),
-    "cbrt(x)": (sp.cbrt(X), (0.7, 1.3)),
     "sinh(x)": (sp.sinh(X), (0.7, 1.3)),
     "cosh(x)": (sp.cosh(X), (-0.7, 1.3)),
     "tanh(x)": (sp.tanh(X), (0.7, 1.3)),

@@ -493,13 +493,3 @@ def test_a_force_on_a_joint_is_refused_with_the_remedy(tmp_path: Path) -> None:
     with refused("EG-TYPE forces.push.joint") as caught:
         eg.load(file).check()
     assert len(caught.value.problems) == 1
-
-
-def test_a_hardening_spring() -> None:
-    m = eg.Model("hard", gravity=(0, 0, 0))
-    body = m.body("body", mass=2.0)
-    m.prismatic("J", m.ground, body, axis="x", coordinate="x")
-    m.hardening_spring("S", m.ground, body, stiffness=30.0, hardening=5.0)
-    mod = m.compile(target="numpy")
-    assert mod.energy([0.8, 0.0])[1] == pytest.approx(30 * 0.8**2 / 2 + 5 * 0.8**4 / 4, rel=1e-14)
-    assert mod.rhs(0.0, [0.8, 0.0])[1] == pytest.approx(-(30 * 0.8 + 5 * 0.8**3) / 2, rel=1e-14)

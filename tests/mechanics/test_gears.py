@@ -704,14 +704,3 @@ def test_against_multipliers_and_between_methods(make: Any, of: tuple[str, ...])
         for mod in (one, two):
             agree(mod.rhs(0.0, x)[n:], expected, 1e-8)
         agree(two.rhs(0.0, x)[n:], one.rhs(0.0, x)[n:], 1e-12 if make is gearbox else 1e-11)
-
-
-def test_a_level_keeps_a_height() -> None:
-    m = eg.Model("level", gravity=(0, 0, -9.81))
-    block = m.body("block", mass=1.0, inertia=(1, 1, 1))
-    m.translational("t", m.ground, block)
-    m.level("flat", block, height=0.25)
-    mod = m.compile(target="numpy")
-    x = mod.x0(t_x_dot=2.0)
-    assert x[mod.x_names.index("t_z")] == pytest.approx(0.25, abs=1e-14)
-    np.testing.assert_allclose(mod.rhs(0.0, x)[mod.n_q :], 0.0, atol=1e-12)

@@ -450,14 +450,3 @@ def same_pose(tree: eg.Module, x: np.ndarray, closed: eg.Module) -> np.ndarray:
     values |= dict(zip([f"{n}_dot" for n in FREE], rates, strict=True))
     values["swing_dot"] = x[tree.x_names.index("swing_dot")]
     return np.array([values[name] for name in closed.x_names])
-
-
-def test_a_slanted_joint_in_a_tree_and_cut() -> None:
-    m = eg.Model("slope", gravity=(0, 0, -10))
-    block = m.body("block", mass=1.0, inertia=(1, 1, 1))
-    m.slanted("s", m.ground, block, slope=0.5)
-    assert m.compile(target="numpy").rhs(0.0, [0.3, 0.0])[1] == pytest.approx(-10 / 1.25, rel=1e-14)
-    m.free("f", m.ground, block)
-    mod = m.compile(target="numpy", independent=["f_z"])
-    assert mod.n_dof == 1
-    assert mod.x0(f_z=0.4)[mod.x_names.index("f_x")] == pytest.approx(0.2, abs=1e-12)

@@ -273,10 +273,3 @@ def test_a_position_by_names() -> None:
     double = compiled("double_pendulum")
     by_output = double.modes({"theta1": 0, "theta2": 0}).frequencies  # theta2 = theta1 + bend, an output
     np.testing.assert_allclose(by_output, double.modes({"theta1": 0, "bend": 0}).frequencies, rtol=1e-9)
-
-
-def test_the_slowest_oscillation_of_a_mass_on_a_spring() -> None:
-    m = eg.Model("spring", gravity=(0, 0, 0))
-    m.prismatic("x", m.ground, m.body("b", mass=2.0), axis="x")
-    m.joint_spring("k", "x", stiffness=50.0)
-    assert m.compile(target="numpy").wobble() == pytest.approx(np.sqrt(50 / 2) / (2 * np.pi), rel=1e-9)

@@ -490,9 +490,3 @@ def test_columns_of_cells_by_differences(soil: Any) -> None:
         np.testing.assert_allclose(J[:, k], (ahead + back) / 2.0, atol=2e-5 * size + 1e-6)
     assert smooth > 150
     assert touched > 30
-
-
-def test_the_power_of_gravity() -> None:
-    m = eg.Model("fall", gravity=(0, 0, -9.81))
-    m.prismatic("z", m.ground, m.body("b", mass=2.0), axis="z")
-    assert m.compile(target="numpy").power_of_gravity([0.3, -1.5]) == pytest.approx([2 * 9.81 * 1.5])

@@ -387,7 +387,3 @@ def test_plots_take_columns_by_their_dotted_names(call: Call, tmp_path: Path) ->
     for more in ("--columns leg1.hip,leg2.hip_dot", "--plot-as phase", "--columns leg1.hip_dot --against leg1.hip"):
         assert call(*words, "--plot", "a.png", *more.split()).code == 0
         (tmp_path / "a.png").unlink()
-
-
-def test_the_size_of_a_model(call: Call) -> None:
-    assert call("size", CRANK, "--bodies").out.splitlines()[0] == "3 bodies, 4 joints"

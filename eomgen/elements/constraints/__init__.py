@@ -10,5 +10,4 @@ CONSTRAINTS = TypeTable(
     rolling="rolling knife_edge",
     drivers="driver",
     switching="hold lock",
-    levels="level",
 )

@@ -6,7 +6,6 @@ FORCES = TypeTable(
     __package__,
     springs="force torque actuator spring damper torsional_spring torsional_damper joint_spring joint_damper "
     "element torsional_element bushing point_gravity",
-    hardening="hardening_spring",
     friction="friction",
     normal_laws="stop",
     muscle="muscle",
