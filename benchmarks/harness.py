@@ -227,14 +227,14 @@ def benchmark(name: str, title: str) -> Callable[[Callable[[Report, bool], None]
 
 def write(page: Path, name: str, report: Report, machine: str) -> None:
     """Put a report into the page of results, in the place of the last one of that name from such a processor."""
-    processor, _, versions = machine.partition(", Python")
     head, _, below = (page.read_text(encoding="utf-8") if page.exists() else HEAD).partition(RULE)
     rows, machines = ([line for line in below.splitlines() if line.startswith(mark)] for mark in ("| ", "- "))
-    others = [row for row in rows if not (row.startswith(f"| {name} |") and row.endswith(f", {processor} |"))]
-    rows = report.rows(name, f"{date.today()}, {processor}") + others
+    letters = {line[5:].partition(", Python")[0]: line[2] for line in machines}
+    letter = letters.setdefault(machine.partition(", Python")[0], "ABCDEFGHIJ"[len(letters)])
+    others = [row for row in rows if not (row.startswith(f"| {name} |") and row.endswith(f" {letter} |"))]
+    rows = report.rows(name, f"{date.today()} {letter}") + others
     rows.sort(key=lambda row: list(BENCHMARKS).index(row.split(" ")[1]))
-    machines = [line for line in machines if not line.startswith(f"- {processor}:")]
-    machines.append(f"- {processor}: Python{versions}")
+    machines = sorted([*(line for line in machines if line[2] != letter), f"- {letter}: {machine}"])
     page.parent.mkdir(parents=True, exist_ok=True)
     page.write_text("\n".join([f"{head}{RULE}", *rows, "", *machines, ""]), encoding="utf-8")
 

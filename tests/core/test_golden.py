@@ -117,10 +117,12 @@ def test_a_part_of_the_page_of_results_takes_the_place_of_the_last_one(tmp_path:
         report.most("seconds", value, 2.5)
         write(page, name, report, "a machine, Python 3")
     _, rows, machines = page.read_text().split("\n\n")
-    measured = f"{date.today()}, a machine |"
+    measured = f"{date.today()} A |"
     assert rows.splitlines()[2:] == [
         f"| {names[0]} | run, s | 3 | SymPy 12 (4) | {measured}",
         f"| {names[0]} | 0 of 1 limits met | | missed: seconds 3 (at most 2.5) | {measured}",
         f"| {names[1]} | run, s | 2 | SymPy 8 (4) | {measured}",
     ]
-    assert machines == "- a machine: Python 3\n"
+    assert machines == "- A: a machine, Python 3\n"
+    write(page, names[0], report, "another machine, Python 3")
+    assert page.read_text().count(f"| run, s | 3 | SymPy 12 (4) | {date.today()} ") == 2
