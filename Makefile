@@ -5,7 +5,7 @@
 # make thorough  make test with everything that is marked thorough: long sweeps, C of all examples, sanitizers, packages
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results.md
 # make notebooks  executes the notebooks anew and stores their outputs; NOTEBOOKS=FILE only this one
-# make lint   ruff, mypy and tools/lint.py alone
+# make lint   ruff, codespell, mypy and tools/lint.py alone
 # make docs   the documentation as a site, docs/_build/html/index.html; a warning is an error
 # make pictures  draws the stored pictures of the documentation anew: of pages, of their blocks, of the gallery
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
@@ -40,6 +40,7 @@ quick: $(VENV)/.installed-test
 
 lint: $(VENV)/.installed-$(if $(PROGRAMS),all-tests,test)
 	@$(BIN)/ruff check .
+	@$(BIN)/codespell benchmarks docs eomgen examples notebooks templates tools *.md *.py Makefile pyproject.toml
 	@$(BIN)/python tools/stubs.py
 	@$(BIN)/mypy
 	@$(BIN)/python tools/lint.py

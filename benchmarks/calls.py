@@ -107,12 +107,17 @@ def call(report: Report, quick: bool) -> None:
         for name, s in samples.items()
     ]
     report.table("call", ("what", "median ns", "best ns", "over ours, allocating"), rows)
+    sympy = {"SymPy lambdify": 1e9 * samples["double pendulum, SymPy lambdify"].median}
+    for name, others in (("double pendulum", sympy), ("slider-crank", {})):
+        report.result(f"rhs of the {name} from Python, a new array, ns", 1e9 * samples[name].median, others)
     rows = []
     for name, module, at in (("double pendulum", pendulum, x), ("slider-crank", crank, x_crank)):
         turns = in_turns(ways_to_call(module, at), 5 if quick else 200, 1.3e-3)
         best = {way: 1e9 * sample.best for way, sample in turns.items()}
         above = {way: best[way] - best["kernel"] for way in ABOVE}
         rows.append([name, best["kernel"], *above.values(), best["both"] - best["out="], best["start"] / 1000])
+        report.result(f"{name}, into an array, above its kernel in C, ns", above["out="])
+        report.result(f"{name}, start of a run, us", rows[-1][-1])
         for way, bound in ABOVE.items():
             report.most(f"{name}, {way}, above the kernel", above[way], bound, "ns")
         report.most(f"{name}, p=, u= and out=, above out= alone", rows[-1][-2], 60, "ns")
@@ -170,6 +175,7 @@ def traced(report: Report, quick: bool) -> None:
         part = {"many": runs}
         ns = [round(1e9 * s.median / part.get(who, 1)) for who, s in samples.items()]
         rows.append([name, *ns, f"{error:.0e}"])
+        report.result(f"rhs of {name} in C, ns", ns[0], {"CasADi's C": ns[2], "JAX, vmap": ns[4]})
     ways = ("eomgen, C", "CasADi, its own evaluation", "CasADi, its C", "JAX, one call", "JAX, vmap")
     report.table("ns of one evaluation of rhs", ("model", *ways, "differ by"), rows)
     report.note(
@@ -207,7 +213,9 @@ def closed_loops(report: Report, quick: bool) -> None:
     difference = max(abs(closed[1] - generated[3]) for closed, generated in each)
     samples = in_turns(contestants(slice(None)), 30 if quick else 3000, 1e-4)
     best = {who: 1e9 * sample.best for who, sample in samples.items()}
-    report.table("slider-crank", ("what", "best ns"), [[*row] for row in best.items()])
+    report.result(
+        "rhs of the slider-crank in C, ns", best["generated"], {"by hand, two states": best["closed form in C"]}
+    )
     report.most("the slider-crank takes, over its closed form,", best["generated"] / best["closed form in C"], 5.0)
     report.most("accelerations of both differ by, relative to 100 rad/s^2,", difference / 100.0, 1e-9)
     rows: list[list[Any]] = []
@@ -225,6 +233,7 @@ def closed_loops(report: Report, quick: bool) -> None:
         rows.append([n, operations / n, us, seconds, float(error), energy, run.residuals.position])
     columns = ("loops", "operations per loop", "rhs us", "10 s in s", "error m", "energy drift J", "residual")
     report.table("N-four-bar", columns, rows)
+    report.result(f"{rows[-1][0]} four-bars, rhs, us", rows[-1][2])
     growth = rows[-1][1] / next(row[1] for row in rows if row[0] == 5)
     report.most(f"operations per loop, {rows[-1][0]} loops over 5,", growth, 1.1)
     report.most("error of the tip after change points,", max(row[4] for row in rows), 1e-3, "m")
@@ -274,6 +283,7 @@ def through_change_points(report: Report, quick: bool) -> None:
             found += runs
     at = (f"{what}, rtol {rtol}" for rtol in ("1e-8", "1e-12") for what in ("error rad", "evaluations", "s"))
     report.table("N-four-bar, 10 s", ("loops", "method", *at, "largest factor"), rows)
+    report.result("largest error of four-bars over that of their closed equation", max(x.factor for x in found))
     report.most("the largest error over that of the closed equation", max(x.factor for x in found), FACTOR)
     report.least("change points noted, at least", min(x.passes for x in found), 10)
     report.most("change points noted, at most", max(x.passes for x in found), 10)
@@ -320,6 +330,8 @@ def large_loops(report: Report, quick: bool) -> None:
                     [what, n, closed.equations.method, *us, closed.text / n / 1000, closed.derive, closed.compile]
                 )
                 report.most(f"{what} chain of {n}, closed over open,", us[2], 4.0)
+                if n >= 400:
+                    report.result(f"rhs of a closed {what} chain of {n}, us", us[1], {"open chain": us[0]})
                 if n == 100 and not spatial:
                     report.most("closed planar chain of 100,", us[1], 60.0, "us")
         report.table("chains", ("chain", "links", "method", "open us", "closed us", "ratio", "text a link kB",
@@ -335,6 +347,7 @@ def large_loops(report: Report, quick: bool) -> None:
         for column, what, sizes in ((2, "derive", 1), (3, "compile", 1), (5, "call", 0), (6, "a step", 0)):
             growth = max(b[column] / a[column] / (b[0] / a[0]) ** sizes for a, b in pairwise(rows))
             report.most(f"four-bars: {what}, growth over that of their number,", growth, 1.3)
+        report.result(f"rhs of {rows[-1][0]} four-bars, us a loop", rows[-1][5])
         report.most(f"{rows[-1][0]} four-bars derive in", rows[-1][2], 5.0, "s")
         report.table("N four-bars in a row", ("N", "method", "derive s", "compile s", "text a loop kB", "us a loop",
                      "with a step"), rows)  # fmt: skip
@@ -411,6 +424,8 @@ def big_trees(report: Report, quick: bool) -> None:
             texts = (sum(map(len, text.values())) / 1000 for text in (emit_c(program), sources))
             rows.append([what, n, derive, seconds, *texts, us["loops"], us.get("straight"), us.get("peer"),
                          1000 * us["loops"] / n, None if differ is None else f"{differ:.0e}"])  # fmt: skip
+            if n in (400, 1600):
+                report.result(f"rhs of a {what} of {n}, us", us["loops"], {"Pinocchio": us.get("peer")})
             if n <= PEER:
                 bound = 2.0 if n <= 200 or branches > 1 else 1.0
                 report.least(f"{what} of {n}, Pinocchio's ABA over ours,", us["peer"] / us["loops"], bound)

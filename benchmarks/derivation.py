@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -59,6 +57,7 @@ def derive(report: Report, quick: bool) -> None:
         for who, sample in seconds.items():
             ratio = sample.median / ours if who.startswith("SymPy") else None
             rows.append([f"{name}, {who}", sample.median, sample.best, ratio, found[who][0]["operations"]])
+        report.result(f"{name}, derived by embedding, s", ours, {"SymPy": seconds[best].median})
         for form in FORMS:
             if size == 20:
                 ratio = seconds[best].median / seconds[f"eomgen {form}"].median
@@ -119,6 +118,8 @@ def growth(report: Report, quick: bool) -> None:
         ):
             a, b = count(of(single)).total, count(of(double)).total
             rows.append([f"{part}, {form}", a, b, b / a, b / (2 * short)])
+            if form == "embedding":
+                report.result(f"operations of {part} of {2 * short} links", b, {f"{short} links": a})
             report.most(f"growth of {part}, {form}, when links double", b / a, 2.1)
 
     def seconds_to_emit(n: int) -> float:
@@ -136,14 +137,13 @@ def growth(report: Report, quick: bool) -> None:
 @benchmark("compile", "compilation of rhs alone")
 def compile_chain(report: Report, quick: bool) -> None:
     """A long chain in fresh processes from an empty cache."""
-    links, results = 10 if quick else 100, []
+    links, seconds = 10 if quick else 100, []
     for _ in range(1 if quick else 3):
         with cold_cache():
-            results.append(in_fresh_process("compile_chain", links))
-    columns = {stage: Sample(tuple(r[stage] for r in results)) for stage in results[0]}
-    report.table(f"{links} links", ("stage", "s"), [[stage, sample.median] for stage, sample in columns.items()])
-    report.most(f"rhs of {links} links compiles from an empty cache in, best,", columns["total"].best, 10, "s")
-    report.note("Default flags; every parameter a symbol. 'derive' is not part of the total. SymPy cannot derive it.")
+            seconds.append(in_fresh_process("compile_chain", links))
+    report.result(f"rhs of {links} links compiled, s", Sample(tuple(seconds)).median)
+    report.most(f"rhs of {links} links compiles from an empty cache in, best,", min(seconds), 10, "s")
+    report.note("Default flags; every parameter a symbol; derivation is not part of it. SymPy cannot derive it.")
 
 
 # -- whole processes ---------------------------------------------------------------------------------------------------
@@ -164,28 +164,10 @@ def _run(model: str, *options: str, **environment: str) -> Finished:
     return run_process([program, "run", str(EXAMPLES / f"{model}.yaml"), *options], environment)
 
 
-def _stages(model: str) -> dict[str, float]:
-    """Seconds by stage as ``eomgen run --json`` tells them, and of the whole process."""
-    done = _run(model, "--json")
-    return {**json.loads(done.stdout)["seconds"], "process": done.wall}
-
-
-def _imports(model: str) -> list[list[Any]]:
-    """Seconds a run of a known model spends importing each package's own modules, the ten largest (which slows it)."""
-    found: Counter[str] = Counter()
-    for line in _run(model, PYTHONPROFILEIMPORTTIME="1").stderr.splitlines():
-        if line.startswith("import time:") and line.count("|") == 2:
-            own, _, name = line.removeprefix("import time:").split("|")
-            if own.strip().isdigit():
-                found[name.strip().split(".")[0]] += int(own)
-    return [[name, microseconds / 1e6] for name, microseconds in found.most_common(10)]
-
-
 @benchmark("latency", "latency of a whole process")
 def latency(report: Report, quick: bool) -> None:
     """``eomgen run`` of new and known models and an exported module beside SymPy, in turns."""
     found: dict[str, list[Finished]] = {}
-    stages: dict[str, dict[str, float]] = {}
     repeats = 1 if quick else 15
     with tempfile.TemporaryDirectory(prefix="eomgen-bench-") as folder:
         program = [str(Path(sys.executable).with_name("eomgen")), "generate", str(EXAMPLES / "slider_crank.yaml")]
@@ -198,8 +180,6 @@ def latency(report: Report, quick: bool) -> None:
                 with cold_cache():
                     took[f"eomgen run {model}, new"] = _run(model)
                     took[f"eomgen run {model}, known"] = _run(model)
-                    if repeat == repeats:
-                        stages[f"{model}, known"], imports = _stages(model), _imports(model)
             took[OF_EXPORTED] = run_process([sys.executable, "-c", EXPORTED], {"PYTHONPATH": f"{folder}/installed"})
             took["import numpy"] = run_process([sys.executable, "-c", "import numpy"])
             for label, (package, task, arguments) in PROCESSES.items():
@@ -207,20 +187,18 @@ def latency(report: Report, quick: bool) -> None:
                     took[label] = run_process([sys.executable, "-m", "benchmarks.tasks", task, arguments])
             for who, done in took.items():
                 found.setdefault(who, []).extend([done] if repeat else [])
-    for model in RUN:
-        with cold_cache():
-            stages[f"{model}, new"] = _stages(model)
-    stages["double_pendulum, SymPy"] = json.loads(found[SYMPY][-1].stdout) | {"process": found[SYMPY][-1].wall}
     wall = {who: Sample(tuple(p.wall for p in processes)) for who, processes in found.items()}
     rows: list[list[Any]] = []
     for who, sample in wall.items():
         ratio = wall[SYMPY].median / sample.median if "double_pendulum" in who and who != SYMPY else None
         rows.append([who, sample.median, sample.best, Sample(tuple(p.cpu for p in found[who])).median, ratio])
-    names, columns = dict.fromkeys(name for split in stages.values() for name in split), sorted(stages, reverse=True)
-    split = [[name, *(stages[column].get(name) for column in columns)] for name in names]
     report.table("whole process, seconds", ("process", "median", "best", "cpu", "SymPy's over it"), rows)
-    report.table("stages, seconds", ("stage", *columns), split)
-    report.table("imports of a run of a known model, seconds", ("modules of", "s"), imports)
+    for model in RUN:
+        for state in ("new", "known"):
+            others = list(PROCESSES) if (model, state) == ("double_pendulum", "new") else []
+            peers = {who.replace(": double_pendulum", ""): wall[who].median for who in others if who in wall}
+            report.result(f"eomgen run {model}, {state}, s", wall[f"eomgen run {model}, {state}"].median, peers)
+    report.result(f"{OF_EXPORTED}, s", wall[OF_EXPORTED].median, {"import numpy": wall["import numpy"].median})
     report.most("slider-crank, new, median,", wall["eomgen run slider_crank, new"].median, 1.2, "s")
     report.most("slider-crank, known, median,", wall["eomgen run slider_crank, known"].median, 0.6, "s")
     ratio = wall[OF_EXPORTED].median / wall["import numpy"].median
@@ -230,7 +208,6 @@ def latency(report: Report, quick: bool) -> None:
         "solves and lambdifies it with cse to plain math, and integrates at the same tolerances, as the others do.",
         "new: the cache is empty; known: it holds the model.",
         "cpu: computed by the process and its children, on all cores; hardly depends on what else the machine does.",
-        "'process' is the wall time of the run whose stages are shown; what is not in a stage is imports and output.",
     )
 
 
@@ -371,7 +348,7 @@ def counts(report: Report, quick: bool) -> None:
     report.table("operations", ("table of docs/operations.md", "row", "stated", "counted"), rows)
     if installed("casadi") and installed("pinocchio"):
         report.table("CasADi on equal terms", ("robot", "base parameters", "method", "multiplications", "additions",
-                     "divisions", "sum", "over eomgen"), list(_of_casadi(quick)))  # fmt: skip
+                     "divisions", "sum", "over eomgen"), list(_of_casadi(report, quick)))  # fmt: skip
     report.note(
         "Equal terms: multiplications (squares too), additions, subtractions and doublings, divisions and reciprocals;",
         "all else is counted for none. CasADi: the shorter of articulated bodies and composite bodies with L^T D L",
@@ -380,7 +357,7 @@ def counts(report: Report, quick: bool) -> None:
     )
 
 
-def _of_casadi(quick: bool) -> Iterator[list[Any]]:
+def _of_casadi(report: Report, quick: bool) -> Iterator[list[Any]]:
     """A row for each robot; accelerations of what is counted are compared with Pinocchio's."""
     import pinocchio as pin
 
@@ -399,4 +376,6 @@ def _of_casadi(quick: bool) -> Iterator[list[Any]]:
                     raise RuntimeError(f"{robot.name}, {text.method}: other equations are counted")
             best = min(texts, key=lambda text: sum(text.arithmetic()))
             own, theirs = of_eomgen(robot, regrouped), best.arithmetic()
+            if regrouped:
+                report.result(f"{robot.name}, operations of rhs", sum(own), {"CasADi": sum(theirs)})
             yield [robot.name, "on" if regrouped else "off", best.method, *theirs, sum(theirs), sum(theirs) / sum(own)]

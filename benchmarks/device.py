@@ -112,7 +112,13 @@ def device(report: Report, quick: bool) -> None:
                 rows.append(
                     [robot.name, function, count, ns["gpu"], ns["cores"], ns["cores"] / ns["gpu"], ns.get("jax")]
                 )
+                if count == BATCHES[-1] and function in ("rhs", "jacobian"):
+                    others = {f"lanes, {THREADS} cores": ns["cores"], "JAX": ns.get("jax")}
+                    report.result(f"{robot.name}, {function}, {count:,} states, ns a state", ns["gpu"], others)
             us = {who: 1e6 * sample.median / count for who, sample in in_turns(case.runs(count), 3).items()}
+            if count == BATCHES[-1]:
+                cores = {f"lanes, {THREADS} cores": us["cores"]}
+                report.result(f"{robot.name}, {count:,} runs of 0.1 s, us a run", us["gpu"], cores)
             runs.append([robot.name, count, us["gpu"], us["cores"], us["cores"] / us["gpu"]])
         report.most(f"{robot.name}: results of the GPU beside the module", case.error, 1e-12)
     sides = ("GPU", f"lanes, {THREADS} cores", "times faster")

@@ -1,11 +1,10 @@
-"""What all benchmarks share: calls timed in turns, processes of their own, limits, and the page of results."""
+"""What all benchmarks share: calls timed in turns, separate processes, limits, and the page of results."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-import re
 import resource
 import statistics
 import subprocess
@@ -18,7 +17,6 @@ from datetime import date
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from textwrap import wrap
 from time import perf_counter, process_time
 from typing import Any
 from unittest.mock import patch
@@ -147,12 +145,17 @@ class Limit:
 
 
 class Report:
-    """What one benchmark found: tables (title, columns, rows), limits, and notes on what the rows mean."""
+    """What one benchmark measured: results for the page; tables (title, columns, rows), limits and notes in full."""
 
     def __init__(self) -> None:
+        self.results: list[tuple[str, float, Mapping[str, float | None]]] = []
         self.tables: list[tuple[str, Sequence[str], Sequence[Sequence[Any]]]] = []
         self.limits: list[Limit] = []
         self.notes: list[str] = []
+
+    def result(self, task: str, ours: float, others: Mapping[str, float | None] | None = None) -> None:
+        """Add a row of the page: a task with its unit, eomgen's number, and those of others."""
+        self.results.append((task, ours, others or {}))
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
         """Add a table."""
@@ -184,17 +187,17 @@ class Report:
         for limit in self.limits:
             console.print(f"  {limit}", style="green" if limit.met else "bold red", highlight=False)
 
-    def markdown(self) -> str:
-        """Its part of the page of results; of the limits those that are missed, and how many are met."""
-        lines = []
-        for title, columns, rows in self.tables:
-            lines += [f"### {title}", "", f"| {' | '.join(columns)} |"]
-            lines += [f"|{'|'.join(['---', *['---:'] * (len(columns) - 1)])}|"]
-            lines += [*(f"| {' | '.join(map(number, row))} |" for row in rows), ""]
-        missed = [f"**{limit}**" for limit in self.limits if not limit.met]
-        verdict = [f"{len(self.limits) - len(missed)} of {len(self.limits)} limits met."] if self.limits else []
-        lines += [*wrap(" ".join(self.notes), 120), ""] if self.notes else []
-        return "\n".join([*lines, *(f"- {line}" for line in (*verdict, *missed)), ""])
+    def rows(self, name: str, measured: str) -> list[str]:
+        """Its rows of the page: results, and the limits that are missed."""
+        rows = []
+        for task, ours, others in self.results:
+            beside = "; ".join(f"{who} {number(x)} ({number(x / ours)})" for who, x in others.items() if x is not None)
+            rows.append(f"| {name} | {task} | {number(ours)} | {beside} | {measured} |")
+        missed = [str(limit).removeprefix("MISSED: ") for limit in self.limits if not limit.met]
+        if missed:
+            met = f"{len(self.limits) - len(missed)} of {len(self.limits)} limits met"
+            rows.append(f"| {name} | {met} | | missed: {'; '.join(missed)} | {measured} |")
+        return rows
 
 
 def number(value: Any) -> str:
@@ -206,6 +209,8 @@ def number(value: Any) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
+HEAD = "# Results of the benchmarks\n\n| benchmark | task | eomgen | others (over eomgen's) | measured |\n"
+RULE = "|---|---|---:|---|---|"
 #: Name -> title and the function that fills a report, at small sizes if ``quick``.
 BENCHMARKS: dict[str, tuple[str, Callable[[Report, bool], None]]] = {}
 
@@ -221,15 +226,17 @@ def benchmark(name: str, title: str) -> Callable[[Callable[[Report, bool], None]
 
 
 def write(page: Path, name: str, report: Report, machine: str) -> None:
-    """Put a report into the page of results, in the place of the last one of that name."""
-    heading = f"## {name}: {BENCHMARKS[name][0]}\n"
-    part = f"{heading}\n{report.markdown()}\n*{date.today()}, {machine}*\n\n"
-    text = page.read_text(encoding="utf-8") if page.exists() else "# Results of the benchmarks"
-    parts = re.split(r"(?m)^(?=## )", text.rstrip() + "\n\n")
-    places = [k for k, one in enumerate(parts) if one.startswith(f"## {name}: ")]
-    parts[places[0] if places else len(parts) :] = [part, *(parts[places[0] + 1 :] if places else [])]
+    """Put a report into the page of results, in the place of the last one of that name from such a processor."""
+    head, _, below = (page.read_text(encoding="utf-8") if page.exists() else HEAD).partition(RULE)
+    rows, machines = ([line for line in below.splitlines() if line.startswith(mark)] for mark in ("| ", "- "))
+    letters = {line[5:].partition(", Python")[0]: line[2] for line in machines}
+    letter = letters.setdefault(machine.partition(", Python")[0], "ABCDEFGHIJ"[len(letters)])
+    others = [row for row in rows if not (row.startswith(f"| {name} |") and row.endswith(f" {letter} |"))]
+    rows = report.rows(name, f"{date.today()} {letter}") + others
+    rows.sort(key=lambda row: list(BENCHMARKS).index(row.split(" ")[1]))
+    machines = sorted([*(line for line in machines if line[2] != letter), f"- {letter}: {machine}"])
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text("".join(parts).rstrip() + "\n", encoding="utf-8")
+    page.write_text("\n".join([f"{head}{RULE}", *rows, "", *machines, ""]), encoding="utf-8")
 
 
 # -- the machine -------------------------------------------------------------------------------------------------------

@@ -60,6 +60,7 @@ def robots(report: Report, quick: bool) -> None:
         ("MJCF models against MuJoCo", mjcf[:1] if quick else mjcf, mujoco_judge),
     ):
         rows: list[list[Any]] = []
+        largest = 0.0
         for name, (path, how) in files:
             if judging is pinocchio_judge:
                 model = eg.load(path, floating=how, actuate=True, rotation="euler_parameters")
@@ -82,7 +83,9 @@ def robots(report: Report, quick: bool) -> None:
                 row += [equations.operations[counted].total, derive, seconds, ns]
             aba = judge.call_time() if hasattr(judge, "call_time") else None
             rows.append([row[0], module.n_v, f"{max(gaps):.0e}", *row[1:], aba])
-            worst = max(worst, *gaps)
+            largest = max(largest, *gaps)
+        worst = max(worst, largest)
+        report.result(f"{len(files)} {title}, largest relative difference", largest)
         each = ("operations", "derive s", "compile s", "rhs ns")
         columns = ("robot", "n", "difference", *(f"{method}: {what}" for method in METHODS for what in each), "aba ns")
         report.table(title, columns, rows)
@@ -126,6 +129,8 @@ def robot_kernels(report: Report, quick: bool) -> None:
             peer = times["Pinocchio"] / times["auto"]
             worst[kernel], least[kernel] = max(worst[kernel], beside), min(least[kernel], peer)
             each = [x for who in methods for x in (counts[who][k], times[who])]
+            if name in ("panda", "talos"):
+                report.result(f"{name}, {kernel}, ns", times["auto"], {"Pinocchio": times["Pinocchio"]})
             rows[kernel].append([name + "*" * floating, module.n_v, *each, times["Pinocchio"], beside, peer])
     columns = ("robot", "n", *(x for who in methods for x in (f"{who}, operations", "ns")), "Pinocchio, ns")
     for kernel in kernels:
@@ -234,6 +239,10 @@ def right_hand_sides(report: Report, quick: bool) -> None:
 def _judge(report: Report, name: str, best: dict[str, float], counts: Mapping[str, int | None], quick: bool) -> None:
     """What peers take at least of our time with the same flags, and operations."""
     own = best["eomgen, default"]
+    casadi = [x for who, x in best.items() if who.startswith("CasADi") and who.endswith(", default")]
+    others = {"CasADi": min(casadi, default=None), "MuJoCo": best.get("MuJoCo, default")}
+    others["Pinocchio from Python"] = best["Pinocchio, from Python, default"]
+    report.result(f"rhs of {name} in C, ns", own, others)
     if not quick:
         for label in FLAGS:
             theirs = [x for who, x in best.items() if who.startswith("CasADi") and who.endswith(f", {label}")]
@@ -280,6 +289,9 @@ def lanes(report: Report, quick: bool) -> None:
         widest, fastest = max(who for who in ns if who.isdigit()), min(ns[label] for label in peer_flags)
         rows.append([robot.name, text.operations, *(ns[label] for label in peer_flags), operations, ns["one"],
                      *(ns.get(f"{width}") for width in (2, 4, 8))])  # fmt: skip
+        others = {"one at a time": ns["one"], **{f"{width} lanes": ns.get(f"{width}") for width in (2, 4)}}
+        others |= {f"CasADi, {label}": ns[label] for label in peer_flags}
+        report.result(f"rhs of {robot.name}, {widest} lanes, ns a state", ns[widest], others)
         report.most(f"{robot.name}, largest relative difference from Pinocchio", max(differences), 1e-7)
         if not quick:
             bound = promised[robot.name]
@@ -351,6 +363,9 @@ def of_grid(report: Report, quick: bool, rounds: int, burst: float) -> None:
                 }
                 own, peer, (cpu, gpu) = us["eomgen"], us["Pinocchio"], GRID[robot][what]
                 rows.append([robot, what, cpu, gpu, peer, own, peer / own, cpu / own, gpu / own])
+                if what == "FD gradient":
+                    others = {"Pinocchio": peer, "published: Pinocchio's code": cpu, "GRiD on a GPU": gpu}
+                    report.result(f"{robot}, jacobian, us", own, others)
                 report.most(f"{robot}, {what}: difference from Pinocchio", gap, 1e-10)
                 if not quick:
                     report.least(f"{robot}, {what}: Pinocchio over ours", peer / own, 1.0)
@@ -391,6 +406,9 @@ def derivatives(report: Report, quick: bool) -> None:
             still = pin.neutral(theirs), 0.3 * np.ones(n), 0.2 * np.ones(n)
             ns = nanoseconds(in_turns(actions | pinocchio_timed(theirs, *still, kernel), rounds, burst))
             own, casadi = ns["eomgen"], ns.get("CasADi")
+            others = {"Pinocchio": ns["Pinocchio"], "CasADi": casadi}
+            if robot.name in ("Panda", "ANYmal", "Talos"):
+                report.result(f"{robot.name}, {kernel}, ns", own, others)
             rows[kernel].append([
                 robot.name + "*" * robot.floating, n, counts[kernel].total if kernel in counts else None, own,
                 texts[kernel].operations if kernel in texts else None, casadi, ns["Pinocchio"], ns["Pinocchio"] / own,
@@ -408,7 +426,10 @@ def derivatives(report: Report, quick: bool) -> None:
         counts, module = pipeline.build(equations, "c", ["rhs", "jacobian"]).counts, equations.compile()
         actions = {kernel: of_module(module, kernel, module.x0()) for kernel in ("rhs", "jacobian")}
         each = [counts[block].total for block in ("loop_slopes", "slopes_by_position", "slopes_by_velocity")]
-        found.append([name, module.n_v, module.n_dof, *each, *nanoseconds(in_turns(actions, rounds, burst)).values()])
+        ns = nanoseconds(in_turns(actions, rounds, burst))
+        if name.endswith(" 100"):
+            report.result(f"{name}, jacobian, ns", ns["jacobian"])
+        found.append([name, module.n_v, module.n_dof, *each, *ns.values()])
     report.table("Jacobians of loops: operations of the state once and of a column, ns", ("mechanism", "n", "freedoms",
                  "state", "column of q", "column of v", "rhs, ns", "jacobian, ns"), found)  # fmt: skip
     report.note(
@@ -422,7 +443,7 @@ def derivatives(report: Report, quick: bool) -> None:
 # -- closed loops ------------------------------------------------------------------------------------------------------
 #: MuJoCo with as small a residual as its solver reaches: until nothing changes, or so many iterations.
 STRICT, ITERATIONS, LINE_SEARCH = "MuJoCo, tolerance 0", 100, 1e-10
-#: Of Pinocchio's proximal solver: tolerances, regularisation, steps; its residuals come nearest to ours with these.
+#: Of Pinocchio's proximal solver: tolerances, regularization, steps; its residuals come nearest to ours with these.
 PROXIMAL = (1e-12, 1e-12, 1e-10, 20)
 BESIDE = 1e-9  #: by how much positions are off the loops where ours steps onto them, as in an integrator
 
@@ -520,6 +541,7 @@ def robot_loops(report: Report, quick: bool) -> None:
             sizes, ns, residual = closed_robot(robot, Path(folder, "robot.xml"), rounds, burst)
             ratios = {who: ns[who] / ns["eomgen"] for who in ("Pinocchio", "MuJoCo", STRICT)}
             rows.append([robot, *sizes, *ns.values(), *ratios.values(), *(f"{x:.0e}" for x in residual.values())])
+            report.result(f"rhs of {robot}, ns", ns["eomgen"], {who: ns[who] for who in ("Pinocchio", "MuJoCo")})
             report.most(f"{robot}: residual of the accelerations", residual["eomgen"], 1e-10)
             if not quick:
                 for who in ("Pinocchio", "MuJoCo"):

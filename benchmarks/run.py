@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if speed["disturbance"] > 1.3:
             console.print("  the machine was busy with other work: limits on seconds say little", style="yellow")
         if page is not None:
-            write(page, name, report, f"{machine}; {calibration}")
+            write(page, name, report, machine)
         summary += [f"{name}: {limit}" for limit in report.limits if not limit.met]
     for line in summary:
         console.print(line, style="bold red", highlight=False)

@@ -63,6 +63,10 @@ def simulate(report: Report, quick: bool) -> None:
     results = {name: run() for name, run in runs.items()}
     samples = in_turns({name: timed(run) for name, run in runs.items()}, 1 if quick else 7)
     base, rows = samples["double_pendulum, 10 s"].best, []
+    median = {name: 1e3 * sample.median for name, sample in samples.items()}
+    for name, mine in zip(modules, list(median)[: len(modules)], strict=True):
+        others = {who: median[f"{name}, {who}"] for who in peers if name == "double_pendulum"}
+        report.result(f"simulate {mine}, ms", median[mine], others)
     for name, s in samples.items():
         calls = int(results[name].nfev)
         ratio = s.best / base if "solve_ivp" in name else None
@@ -153,6 +157,9 @@ def integrate(report: Report, quick: bool) -> None:
                 [over[name], float(np.abs(finals[name] - exact).max())] if name != "simulate, one step" else [None] * 2
             )
             rows.append([f"{n} links, {name}", 1e3 * sample.median, 1e3 * sample.best, sample.best / base, *ends])
+        beside = ("hand-written C loop", "numbalsoda DOP853", "solve_ivp, SciPy's DOP853", "odeint")
+        others = {who: 1e3 * best[who] for who in beside if who in best}
+        report.result(f"{n} links, 10 s at rtol 1e-10, ms", 1e3 * best["simulate"], others)
         report.most(f"{n} links: simulate over a hand-written C loop", best["simulate"] / base, 1.15)
         if (soda := "numbalsoda DOP853") in best:
             for who in ("simulate", "integrator"):
@@ -222,6 +229,8 @@ def race(
         ratios = [found[who] / found["heyoka"] for who in ("DOP853", "Taylor")]
         what = f"{n} links, error {goal:g}"
         rows.append([what, *(1e3 * s for s in found.values()), *ratios, seconds / len(theirs)])
+        ms = {who: 1e3 * s for who, s in found.items()}
+        report.result(f"{what}, ms", min(ms["DOP853"], ms["Taylor"]), {"heyoka": ms["heyoka"]})
         report.most(f"{what}: our best over heyoka", min(ratios), bound)
     return rows
 
@@ -255,6 +264,8 @@ def stiff(report: Report, quick: bool) -> None:
         rows += [[f"{name}, {who}", 1e3 * s.best, 1e3 * s.median, f"{errors[who]:.1e}"] for who, s in samples.items()]
         best = {who: sample.best for who, sample in samples.items()}
         equal = next(who for who in loose if errors[who] <= errors[lsoda])
+        others = {"odeint": 1e3 * best[lsoda], "SciPy's Radau at rtol 1e-8": 1e3 * best[scipy]}
+        report.result(f"{name}, 10 s with no larger an error than odeint, ms", 1e3 * best[equal], others)
         report.least(f"{name}: SciPy's Radau with our Jacobian over ours", best[scipy] / best["ours, rtol 1e-08"], 20.0)
         report.most(f"{name}: ours over odeint at no larger error", best[equal] / best[lsoda], 1.0)
     report.table("stiff", ("10 s of", "best ms", "median ms", "error"), rows)
@@ -324,6 +335,8 @@ def fit(report: Report, quick: bool) -> None:
     errors = {name: float((np.abs(way() - truth) / size).max()) for name, way in ways.items()}
     samples = in_turns({name: timed(way) for name, way in ways.items()}, 2 if quick else 7)
     first = samples["along the run"].median
+    others = {who: 1e3 * sample.median for who, sample in samples.items() if who.startswith("differences")}
+    report.result("derivatives of a run by eight parameters, ms", 1e3 * first, others)
     rows = [[name, s.median * 1e3, s.median / first, errors[name]] for name, s in samples.items()]
     report.table("eight parameters", ("way", "ms", "times the first", "differs from the first at rtol 1e-12 by"), rows)
     if not quick:
@@ -446,6 +459,9 @@ def ensembles(report: Report, quick: bool) -> None:
         [who, middle[who], best[who], middle[mine] / middle[who], best[mine] / best[who],
          1e6 * cpu[who].best * part.get(who, 1) / count, errors.get(who)] for who in actions
     ])  # fmt: skip
+    others = {"heyoka": max((best[who] for who in heyoka[:-1]), default=None), "solve_ivp": best[scipy]}
+    others["DOP853 by hand in 4 lanes"] = best[hand]
+    report.result(f"{count} double pendulums, runs a second", max(best[mine], best[series]), others)
     if not quick:
         report.least("over a loop of solve_ivp", best[mine] / best[scipy], 600.0)
         report.least("over 4 lanes by hand", best[mine] / best[hand], 0.85)
@@ -486,10 +502,12 @@ def loop_lanes(report: Report, quick: bool) -> None:
         calls = {who: timed(partial(m.rhs, 0.0, x, out=out)) for who, m in modules.items()}
         a, b = (1e9 * sample.median / columns for sample in in_turns(calls, repeats).values())
         rows.append([name, a, b, b / a, alike])
+        report.result(f"rhs of {name} in lanes, ns a state", a, {"one at a time": b})
     title = f"{count} slider-cranks, 10 s, rtol 1e-08, two threads"
     report.table(title, ("runs", "runs a second", "best", "median error"), found)
     report.table("right-hand sides of a batch, nanoseconds a state", ("model", "lanes", "one after the other", "ratio",
                  "same bits"), rows)  # fmt: skip
+    report.result(f"{count} slider-cranks, runs a second", found[0][1], {"one after the other": found[1][1]})
     report.least("runs in lanes over runs one after the other", found[0][1] / found[1][1], 3.0)
     report.most("runs that differ between one thread and two", float(not same), 0.0)
     report.note(
@@ -616,6 +634,8 @@ def equilibria(report: Report, quick: bool) -> None:
         rows.append([family, len(own), *map(sum, zip(*(case.peers for case in own), strict=True)),
                      sum(case.ours for case in own), lost, np.median(times), max(times)])  # fmt: skip
     report.table("equilibria", ("family", "cases", *PEERS, "ours", "lost", "median ms", "longest ms"), rows)
+    total, *peers, ours = (sum(row[k] for row in rows) for k in range(1, 6))
+    report.result(f"equilibria of {total} mechanisms that are solved", ours, dict(zip(PEERS, peers, strict=True)))
     report.most("lost", sum(row[6] for row in rows), 0)
     wrong = sum(not case.agrees for own in judged.values() for case in own)
     report.most("stability that the stiffness contradicts", wrong, 0)

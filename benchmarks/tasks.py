@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from time import perf_counter
 from typing import Any
@@ -38,43 +37,28 @@ def derive_sympy(model: str, size: list[Any], counted: bool) -> dict[str, Any]:
     return {"seconds": seconds, "operations": kane.operations() if counted else None}
 
 
-def compile_chain(n: int) -> dict[str, float]:
-    """Seconds by stage from a derived chain to its loaded ``rhs``."""
+def compile_chain(n: int) -> float:
+    """Seconds from a derived chain to its loaded ``rhs``."""
     from .models import chain
 
     equations = chain(n).derive()
-    derivation = dict(equations.seconds)
-    start, busy = perf_counter(), os.times()
-    module = equations.compile(kernels=["rhs"])
-    total, done = perf_counter() - start, os.times()
     start = perf_counter()
-    module.rhs(0.0, [0.1] * (2 * n))
-    first_call = perf_counter() - start
-    stages = {stage: seconds for stage, seconds in equations.seconds.items() if stage not in derivation}
-    cpu = {
-        "cpu of this process": done.user + done.system - busy.user - busy.system,
-        "cpu of the compiler": done.children_user + done.children_system - busy.children_user - busy.children_system,
-    }
-    return {**stages, "total": total, **cpu, "first call": first_call, "derive": sum(derivation.values())}
+    equations.compile(kernels=["rhs"])
+    return perf_counter() - start
 
 
-def run_double_pendulum_sympy() -> dict[str, float]:
-    """What a SymPy user does instead of ``eomgen run examples/double_pendulum.yaml``; seconds by stage."""
-    start = perf_counter()
+def run_double_pendulum_sympy() -> None:
+    """What a SymPy user does instead of ``eomgen run examples/double_pendulum.yaml``."""
     from scipy.integrate import solve_ivp
 
     from .sympy_peer import pendulum_rhs
 
-    imported = perf_counter()
     rhs = pendulum_rhs({"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 9.81})
-    derived = perf_counter()
     solve_ivp(rhs, (0.0, 10.0), START, method="DOP853", **TIGHT)
-    return {"import": imported - start, "derive": derived - imported, "simulate": perf_counter() - derived}
 
 
-def run_double_pendulum_pydy(generator: str) -> dict[str, float]:
+def run_double_pendulum_pydy(generator: str) -> None:
     """The same through PyDy's code generation and odeint, as its examples do."""
-    start = perf_counter()
     import numpy as np
     import sympy as sm
     from pydy.codegen.ode_function_generators import generate_ode_function
@@ -82,26 +66,19 @@ def run_double_pendulum_pydy(generator: str) -> dict[str, float]:
 
     from .sympy_peer import double_pendulum
 
-    imported = perf_counter()
     kane = double_pendulum()
-    derived = perf_counter()
     rhs = generate_ode_function(
         kane.forcing, kane.q, kane.u, kane.parameters, mass_matrix=kane.mass_matrix,
         coordinate_derivatives=sm.Matrix(kane.u), generator=generator,
     )  # fmt: skip
-    made = perf_counter()
     odeint(rhs, START, np.linspace(0, 10, 1001), args=(np.array([1.0, 1.0, 1.0, 1.0, 9.81]),), **TIGHT)
-    seconds = {"import": imported - start, "derive": derived - imported}
-    return {**seconds, "compile": made - derived, "simulate": perf_counter() - made}
 
 
-def run_double_pendulum_casadi() -> dict[str, float]:
+def run_double_pendulum_casadi() -> None:
     """The same in CasADi's virtual machine, the accelerations written by hand (its users have no derivation)."""
-    start = perf_counter()
     import casadi as ca
     import numpy as np
 
-    imported = perf_counter()
     x = ca.SX.sym("x", 4)
     bend, whole = x[1], x[2] + x[3]
     s, c, g = ca.sin(bend), ca.cos(bend), 9.81  # unit masses and lengths; the second angle from the first rod
@@ -110,9 +87,7 @@ def run_double_pendulum_casadi() -> dict[str, float]:
     ode = ca.vertcat(x[2], x[3], a1, b2 - c * a1 - a1)
     times, options = np.linspace(0, 10, 1001), {"reltol": TIGHT["rtol"], "abstol": TIGHT["atol"]}
     integrator = ca.integrator("I", "cvodes", {"x": x, "ode": ode}, 0, times[1:], options)
-    made = perf_counter()
     integrator(x0=START)
-    return {"import": imported - start, "derive": made - imported, "simulate": perf_counter() - made}
 
 
 if __name__ == "__main__":

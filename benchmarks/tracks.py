@@ -88,6 +88,7 @@ def tracks(report: Report, quick: bool) -> None:
                          us["project"], us["jacobian"] / 1000])  # fmt: skip
         report.table("closed tracks", ("links", "n_x", "derive s", "with compilation, CPU s", "text MB",
                      "of contacts MB", "rhs us", "project us", "jacobian ms"), rows)  # fmt: skip
+        report.result(f"rhs of a track of {rows[-1][0]} links, us", rows[-1][6], {"40 links": rows[0][6]})
         report.most(f"a call of {rows[-1][0]} links over one of 40", rows[-1][6] / rows[0][6], 10.0)
         report.most(f"text of contacts of {rows[-1][0]} links over 40", rows[-1][5] / rows[0][5], 1.05)
         for column, what in ((2, "derive"), (6, "rhs"), (7, "project")):
@@ -104,6 +105,7 @@ def tracks(report: Report, quick: bool) -> None:
     title = "excavator, 49 links, from rest to 0.95 m/s"
     report.table(title, ("method", "of real time", "steps", "calls", "way m"), found)
     report.most("excavator, derived and compiled", machine.wall, 30.0, "s")
+    report.result(f"{title}, times real time", max(row[1] for row in found))
     report.least("excavator at 1e-4, of real time", max(row[1] for row in found), 0.2)
     mine = f"rhs {machine.us['rhs']:.1f} us, jacobian {machine.us['jacobian'] / 1000:.1f} ms"
     report.note(
@@ -160,6 +162,7 @@ def track_contacts(report: Report, quick: bool) -> None:
     few, many, small, large = rows
     report.table("contacts", ("model", "n_x", "text of contacts, characters", "its compilation, CPU s", "rhs, CPU us"),
                  rows)  # fmt: skip
+    report.result(f"text of contacts of a track of {links} links, characters", many[2], {"40 links": few[2]})
     report.most(f"text of contacts of {links} links over 40", many[2] / few[2], 1.05)
     report.most(f"compilation of contacts of {links} links over 40", many[3] / few[3], 1.2)
     report.most(f"a call of {links} links over one of 40", many[4] / few[4], 10.0)
@@ -219,6 +222,7 @@ def rigid_tracks(report: Report, quick: bool) -> None:
     ]  # fmt: skip
     report.table("drive on flat ground", ("method", "of real time", "way m", "speed m/s", "contacts", "residual m/s",
                  "steps missed", "penetration m"), rows)  # fmt: skip
+    report.result("excavator with rigid contact, times real time", seconds / cpu, {"MuJoCo": seconds / theirs})
     report.least("excavator by moreau at 1e-3, of real time", seconds / cpu, 1.0)
     report.most("part of the steps that miss the tolerance", missed, 0.04)
     report.most("its way beside MuJoCo's", abs(way / far - 1.0), 0.01)
@@ -276,6 +280,7 @@ def long_drive(report: Report, quick: bool) -> None:
     row = [seconds / cpu, way, facts["penetration"], facts["contact_residual"], turns, farthest, open_, gained]
     report.table("a drive", ("of real time", "way m", "penetration m", "residual m/s", "turns", "farthest pitches",
                  "open m", "gained"), [row])  # fmt: skip
+    report.result(f"excavator with rigid contact, {seconds:g} s, times real time", seconds / cpu)
     report.least("of real time", seconds / cpu, 1.0)
     report.least("turns of the chain around its wheels", turns, 0.999)
     report.most("farthest pin, in pitches", farthest, 1.0)

@@ -54,7 +54,7 @@ numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 numpydoc_xref_param_type = True  # types that have a place in the reference are links, other words are words
 numpydoc_xref_ignore = "all"
-numpydoc.xref.DEFAULT_LINKS.clear()  # Python's and NumPy's own, whose pages would be asked for
+numpydoc.xref.DEFAULT_LINKS.clear()  # Python's and NumPy's own, whose pages would be requested
 numpydoc_xref_aliases = documented_classes()
 
 # What a reader sees.  Formulas are drawn by a MathJax that lies beside the pages, in one file without fonts.

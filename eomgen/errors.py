@@ -90,7 +90,7 @@ CODES = {
     "EG-UNAVAILABLE": "An attribute or a call does not exist for this model.",
 }
 #: Characters of each part of a problem that are shown: names and expressions may be as long as the file.
-SHOWN = 2000
+LONGEST_PART = 2000
 #: What to do where a value is not finite.
 TO_BE_FINITE = "look for a division by zero, or a root or logarithm of a negative number"
 #: Files that users do not write: installed packages and eomgen's own.
@@ -182,7 +182,7 @@ class Problem(NamedTuple):
 
     def __str__(self) -> str:
         place = f"{_cell(self.file) or self.file}:{self.line}: " if self.file else ""
-        path, message, remedy = (shortened(part, SHOWN) for part in (self.path, self.message, self.remedy))
+        path, message, remedy = (shortened(part, LONGEST_PART) for part in (self.path, self.message, self.remedy))
         return visible(f"{place}{path}: {message}{f'; {remedy}' if remedy else ''}", lines=False)
 
 
@@ -326,7 +326,7 @@ class SimulationInterrupted(KeyboardInterrupt):
     Attributes
     ----------
     trajectory : Trajectory
-        The run up to there, made when it is asked for.
+        The run up to there, made when it is requested.
     """
 
     code = "EG-INTERRUPTED"

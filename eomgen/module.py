@@ -84,7 +84,7 @@ def find_function(file: str, name: str) -> Any:
 
 
 class LazyMethod:
-    """A function of another part of the package as a method, which is loaded when it is asked for."""
+    """A function of another part of the package as a method, which is loaded when it is requested."""
 
     def __init__(self, name: str) -> None:
         self.name = name

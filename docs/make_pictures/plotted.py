@@ -164,24 +164,38 @@ def method() -> Any:
 @picture
 def operations() -> Any:
     """Operations of right-hand sides, from the table of the page."""
-    return bars("operations", r"\| (\w+) \(URDF\) \| ([\d,]+) \| [\d,]+ \| \d+ \| ([\d,]+) \|", "operations per call")
+    text = (DOCS / "operations.md").read_text(encoding="utf-8")
+    found = re.findall(r"\| (\w+) \(URDF\) \| ([\d,]+) \| [\d,]+ \| \d+ \| ([\d,]+) \|", text)
+    numbers = [(robot, *(int(n.replace(",", "")) for n in counts)) for robot, *counts in found]
+    return bars(numbers, "operations per call", ("eomgen", "CasADi"))
 
 
 @picture
 def speed() -> Any:
-    """Times of right-hand sides, from the table of the page."""
-    row = r"\| (Panda|UR5|Talos)[^|]*\| [\d,]+ \| ([\d,]+) \| ([\d,]+) \| [\d.]+ \| [\d.]+ \| ([\d.]+) \|"
-    return bars("speed", row, "ns per state", ("CasADi, -O3 -march=native", "eomgen", "eomgen, 8 lanes"))
+    """Times of right-hand sides, from the last measurement."""
+    others = ("CasADi, -O3 native", "one at a time")
+    rows = measured(r"lanes \| rhs of (\w+), 8 lanes, ns a state")
+    found = [(robot, *(ns[who] for who in others), ns["eomgen"]) for robot, ns in rows.items()]
+    return bars(found, "ns per state", ("CasADi, -O3 -march=native", "eomgen", "eomgen, 8 lanes"))
 
 
-def bars(page: str, row: str, label: str, names: Sequence[str] = ("eomgen", "CasADi")) -> Any:
-    """Bars of the numbers in a table of a page."""
-    found = re.findall(row, (DOCS / f"{page}.md").read_text(encoding="utf-8"))
+def measured(task: str) -> dict[str, dict[str, float]]:
+    """Newest numbers in benchmarks/results.md of the tasks that match, by the robot in them and by who was measured."""
+    text = (DOCS.parent / "benchmarks" / "results.md").read_text(encoding="utf-8")
+    found: dict[str, dict[str, float]] = {}
+    for robot, own, others in re.findall(rf"^\| {task} \| ([^|]+) \| ([^|]+) \|", text, re.MULTILINE):
+        each = [f"eomgen {own}", *re.sub(r" \([\d.,]+\)", "", others).split("; ")]
+        numbers = {who: float(ns.replace(",", "")) for who, ns in (one.rsplit(" ", 1) for one in each)}
+        found.setdefault(robot, numbers)
+    return found
+
+
+def bars(found: Sequence[tuple[Any, ...]], label: str, names: Sequence[str]) -> Any:
+    """Bars of numbers: a label and a number of each name."""
     figure, ax = panels(size=(6.4, 2.8))
     place = np.arange(len(found))
     for k, name in enumerate(names):
-        heights = [float(line[k + 1].replace(",", "")) for line in found]
-        drawn = ax.bar(place + 0.8 / len(names) * k, heights, 0.75 / len(names), label=name)
+        drawn = ax.bar(place + 0.8 / len(names) * k, [line[k + 1] for line in found], 0.75 / len(names), label=name)
         ax.bar_label(drawn, fmt="{:,.0f}", fontsize=7)
     ax.set_xticks(place + 0.4 - 0.4 / len(names), [line[0] for line in found])
     ax.set(ylabel=label, yscale="log")
@@ -249,20 +263,10 @@ def forms() -> Any:
 @picture
 def comparison_robots() -> Any:
     """Times of forward dynamics, from the last measurement."""
-    text = (DOCS.parent / "benchmarks" / "results.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\w+) \| ([^|]+) \| [\d,]* \| ([\d,]+) \|", text.partition("\n## rhs: ")[2], re.MULTILINE)
-    found = {(robot, who): float(ns.replace(",", "")) for robot, who, ns in rows}
-    robots = ("UR5", "Panda", "ANYmal", "Talos")
-    tools = {
-        "eomgen": ("eomgen",),
-        "CasADi": ("CasADi, articulated bodies", "CasADi, composite bodies"),
-        "MuJoCo": ("MuJoCo",),
-        "Pinocchio (Python)": ("Pinocchio, from Python",),
-    }
+    rows, robots = measured(r"rhs \| rhs of (\w+) in C, ns"), ("UR5", "Panda", "ANYmal", "Talos")
     figure, ax = panels(size=(7.5, 3))
-    for tool, names in tools.items():
-        best = [min(found[robot, name] for name in names) for robot in robots]
-        ax.plot(best, robots, "o", markersize=9, label=tool)
+    for tool in ("eomgen", "CasADi", "MuJoCo", "Pinocchio from Python"):
+        ax.plot([rows[robot][tool] for robot in robots], robots, "o", markersize=9, label=tool)
     ax.set(xscale="log", xlabel="one evaluation of forward dynamics (ns, logarithmic)")
     ax.margins(y=0.2)
     ax.grid(alpha=0.3)

@@ -136,7 +136,7 @@ def _positions(
 ) -> Array:
     """The q nearest to the start with C(q, t) = 0."""
     layout = module.layout
-    start = start if layout.space is None else layout.space.normalised(start)
+    start = start if layout.space is None else layout.space.normalized(start)
     free = np.array([name not in fixed for name in layout.velocity_labels])
     n_h = layout.n_h
     if not n_h:

@@ -362,7 +362,7 @@ class GapEvents(Events):
         return {**(super().encode() or {}), "crowd": ENDLESS}
 
     def _value(self, i: int, t: float, x: Array) -> float:
-        """A gap; all of them are asked for in turn."""
+        """A gap; all of them are requested in turn."""
         key = (t, x.tobytes())
         if key != self._known:
             self._known, self._values = key, self.gaps.values(t, x) - self._lift

@@ -54,7 +54,7 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
     layout = module.layout
     coordinates = layout.q + layout.loops
     known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]
-    check_names("coordinate or rate", named, known)
+    check_names("coordinate or rate", named, known, ("t",))
     names = tuple(name for name in named if name in coordinates)
     for name in named:
         base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)

@@ -23,7 +23,7 @@ CLOSE = 1e-6
 DIFFERENCES = 1e-8
 #: Scaled rate (1/s) that the constraints give to a displacement, above which an error speaks of it.
 MOVING = 1e-9
-#: Relative difference up to which K counts as symmetric where its modes are asked for.
+#: Relative difference up to which K counts as symmetric where its modes are requested.
 SYMMETRIC = 1e-9
 #: Smallest component of a unit self-stress that counts.
 SEEN = 1e-7

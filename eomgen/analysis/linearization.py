@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base import algebra
 from ..base.algebra import Array, Indices
-from ..base.limits.numbers import EPS, SHOWN, TINY
+from ..base.limits.numbers import EPS, ROUNDED_ZERO, TINY
 from ..base.results import Result, ResultTable, same_keys
 from ..base.texts import number
 from ..errors import cannot
@@ -347,7 +347,7 @@ class Linearization(Result):
         tangent: TangentSpace | None = None,
         residual: Array | None = None,
     ) -> None:
-        self.own = residual  # accelerations of the model's own forces, scaled (1/s^2)
+        self.own_forces = residual  # accelerations of the model's own forces, scaled (1/s^2)
         self.layout, self.name, self.t, self.x, self.u = layout, layout.name, t, x, u
         self.A, self.B, self.C, self.D = matrices
         self.states, self.inputs, self.outputs, self.drift = states, layout.u, layout.y, drift
@@ -422,11 +422,11 @@ class Linearization(Result):
     @property
     def _forces(self) -> float:
         """Accelerations that count, at most 1: those of the model's own forces, or their change over a unit."""
-        if self.own is None or self.tangent is None:
+        if self.own_forces is None or self.tangent is None:
             return 1.0
         n, s = len(self.position_names), self.layout.scales.q
         slopes = np.abs(self.A[n:, :n]) * s[self.tangent.positions] / s[self.tangent.velocities, None]
-        return min(1.0, max(float(self.own.max(initial=0.0)), float(slopes.max(initial=0.0))))
+        return min(1.0, max(float(self.own_forces.max(initial=0.0)), float(slopes.max(initial=0.0))))
 
     @property
     def _scaled_drift(self) -> Array:
@@ -449,24 +449,24 @@ class Linearization(Result):
         equations do not decide.  Where the stiffness is symmetric and nothing drives the motion, the sign of the
         stiffness decides.
         """
-        if self.mass is None or self.tangent is None or self.own is None:
-            return verdict(None, self.A, self.own)
+        if self.mass is None or self.tangent is None or self.own_forces is None:
+            return verdict(None, self.A, self.own_forces)
         M, n = self.mass, len(self.position_names)
         errors = np.zeros_like(self.A)
         if M.size:
             C_error = MARGIN * np.abs(M) @ np.abs(self.A[n:, n:])
             errors[n:] = np.abs(algebra.inv(M)) @ np.hstack([self.stiffness_error, C_error])
             errors[self.A == 0.0] = 0.0  # no force at all, or one that rounding has not touched
-        return verdict(self._second(), self.A, self.own, errors=errors)
+        return verdict(self._second(), self.A, self.own_forces, errors=errors)
 
     @property
     def stiffness_error(self) -> Array:
         """Bounds (n_dof, n_z) for what rounding does to the stiffness."""
         assert self.mass is not None
-        assert self.own is not None
+        assert self.own_forces is not None
         assert self.tangent is not None
         n = len(self.position_names)
-        residual = np.zeros(0) if n != len(self.mass) else self.own
+        residual = np.zeros(0) if n != len(self.mass) else self.own_forces
         return stiffness_errors(self.mass, self.A[n:, :n], residual, self.layout.place_scales.q[self.tangent.positions])
 
     def _second(self) -> SecondOrder | None:
@@ -618,4 +618,4 @@ def without_noise(
     largest = dict.fromkeys(units, 0.0)
     for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
         largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
-    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
+    return [0.0 if abs(x) <= ROUNDED_ZERO * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]

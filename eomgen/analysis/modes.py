@@ -180,12 +180,12 @@ class Modes(Result):
         """
         if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= len(self.squares):
             raise off_range(f"mode is one of 1 to {len(self.squares)}, not {mode!r}")
-        return self._show().animate_mode(self._module, self.linear.x, self._shown(mode - 1), file, **options)
+        return self._show().animate_mode(self._module, self.linear.x, self._shape(mode - 1), file, **options)
 
     def _show(self) -> Any:
         return load_show("mode_shapes")
 
-    def _shown(self, k: int) -> tuple[Array, str]:
+    def _shape(self, k: int) -> tuple[Array, str]:
         """The displacements q' of a mode, and what is written above it."""
         v, space = self.motions[:, k], self.linear.layout.space
         result = v if space is None else space.rates(self.linear.x[: self.linear.layout.n_q], v)
@@ -196,7 +196,7 @@ class Modes(Result):
         if self._module.info.picture is None or not len(self.squares):
             return table
         swinging = [k for k in range(len(self.squares)) if self.hertz[k]] or list(range(len(self.squares)))
-        pictures = [self._shown(k) for k in swinging[:SHAPES]]
+        pictures = [self._shape(k) for k in swinging[:SHAPES]]
         try:
             data = self._show().swinging_gif(self._module, self.linear.x, pictures)
         except EomgenError as error:

@@ -432,7 +432,7 @@ def after_reset(
     if layout.space is not None:
         for i, _ in layout.quaternion_slots:
             dq[i : i + 4] /= np.linalg.norm(star[i : i + 4])
-        star[:n_q] = layout.space.normalised(star[:n_q])
+        star[:n_q] = layout.space.normalized(star[:n_q])
         dq = dq - layout.space.stretch(star[:n_q], dq)
     if not layout.n_c:
         return np.vstack([dq, dv])
@@ -501,7 +501,7 @@ class Saltation(Events):
         self.run, self.span, self.tolerances, self.corners = run, span, tolerances, corners
         self.module, self.n = run.module, run.module.n_x
         self.slopes = [formula.slopes(self.module.p) for _, formula in self.formulas]
-        self.found: list[EventSlopes] = []
+        self.crossed: list[EventSlopes] = []
 
     def encode(self) -> dict[str, Any] | None:
         """The events, at each of which the loop stops, whatever it does: rates may jump there."""
@@ -535,14 +535,14 @@ class Saltation(Events):
         dt = np.zeros(S.shape[1]) if fixed else self._time(t, x, S, index, before, changes)
         move = self.run.move(t, x, S + np.multiply.outer(before, dt), dt)
         if not changes:
-            self.found.append(EventSlopes(name, t, x, x, dt, move.x, move.x))
+            self.crossed.append(EventSlopes(name, t, x, x, dt, move.x, move.x))
             return z
         x_after, d_after = x, move.x
         if event.action != GO_ON:
             x_after = super().reset(self.module, forcing, t, x, [index])
             d_after = self._after(t, x, move, x_after, index)
             after = self._sides(t, x_after)[1]
-        self.found.append(EventSlopes(name, t, x, x_after, dt, move.x, d_after))
+        self.crossed.append(EventSlopes(name, t, x, x_after, dt, move.x, d_after))
         x_after, S = self._consistent(t, x_after, d_after - np.multiply.outer(after, dt))
         return self.run.joined(x_after, S)
 
@@ -552,7 +552,7 @@ class Saltation(Events):
         self._refuse_others(t, x, index, before)
         dt = self._time(t, x, S, index, before, True)
         moved = S + np.multiply.outer(before, dt)
-        self.found.append(EventSlopes(self.names[index], t, x, x, dt, moved, moved))
+        self.crossed.append(EventSlopes(self.names[index], t, x, x, dt, moved, moved))
 
     def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
         forcing, here = self.run.forcing, self.run.at(t, x)

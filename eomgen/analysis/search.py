@@ -53,7 +53,7 @@ class Solver:
     def solve(self, residual: Array) -> Array:
         return np.asarray(-self.V.T @ (self.inverse * (self.U.T @ (residual / self.sizes))))
 
-    def shown(self, change: Array) -> Array:
+    def displacements(self, change: Array) -> Array:
         """The correction as a scaled displacement of the tree and a change of scaled unknowns."""
         return np.concatenate([self.linear.moved @ change, change[self.J.shape[1] - len(self.linear.changed) :]])
 
@@ -66,7 +66,7 @@ class Solver:
         left = residual / self.sizes + self.J @ change
         answers = np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T))
         limit = max(ARRIVED, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
-        return largest(self.shown(change)) <= limit and largest(left) <= rounding
+        return largest(self.displacements(change)) <= limit and largest(left) <= rounding
 
 
 class SearchPoint(NamedTuple):
@@ -79,7 +79,7 @@ class SearchPoint(NamedTuple):
     here: Balance
 
 
-class Held(NamedTuple):
+class FixedRow(NamedTuple):
     """A row of a held coordinate."""
 
     label: str
@@ -99,7 +99,7 @@ class Search:
         self.scale = np.array(layout.scales.q)  #: (n_v,) of displacements; of states what they are about to change by
         self.moving = layout.n_v - len(s)
         self.scale[self.moving :] = np.maximum(1.0, np.abs(s))
-        self.module, self.layout, self.t, self.held, self.names = module, layout, t, fixed, tuple(unknowns)
+        self.module, self.layout, self.t, self.fixed, self.names = module, layout, t, fixed, tuple(unknowns)
         check_names("parameter or input", self.names, layout.p + layout.u)
         self.parameters = [layout.p.index(name) for name in self.names if name in layout.p]
         self.inputs = [layout.u.index(name) for name in self.names if name in layout.u]
@@ -117,17 +117,17 @@ class Search:
     def initial_unknowns(self) -> Array:
         return np.concatenate([self.module.p[self.parameters], self.module.u[self.inputs]])
 
-    def rows_to_hold(self, module: BoundModel, q: Array) -> list[Held]:
+    def rows_to_hold(self, module: BoundModel, q: Array) -> list[FixedRow]:
         """The held coordinates, three rows for a rotation."""
         initial, layout, result = Initial(module.kernels, self.t), self.layout, []
-        for name in self.held:
+        for name in self.fixed:
             for row in initial.gradients(q, name):
                 moved = np.flatnonzero(row)
                 if name in layout.loops:
                     label, scale = name, float(layout.loop_scales[layout.loops.index(name)])
                 else:
                     label, scale = displacement_names(layout)[moved[0]], float(layout.scales.q[moved[0]])
-                result.append(Held(label, name, row / layout.scales.q, scale))
+                result.append(FixedRow(label, name, row / layout.scales.q, scale))
         return result
 
     def gradients(self, module: BoundModel, q: Array) -> Array:
@@ -159,9 +159,9 @@ class Search:
         module = self.bound(values)
         initial = Initial(module.kernels, self.t)
         if self.layout.n_h:
-            q = initial.system.close(q, self.held, restarts=0).q
-        elif self.held:
-            q = initial.system.with_values(q, self.held)
+            q = initial.system.close(q, self.fixed, restarts=0).q
+        elif self.fixed:
+            q = initial.system.with_values(q, self.fixed)
         fixed = self.gradients(module, q) if self.supported else None
         return SearchPoint(q, states, values, module, balance_forces(module, self.t, q, states, fixed, preferred))
 
@@ -293,7 +293,7 @@ def newton(
         solver = Solver(search.linearize(point))
         residual = search.residual(point.here, point.here)
         change = solver.solve(residual)
-        readable = solver.shown(change)
+        readable = solver.displacements(change)
         size, longest = float(np.linalg.norm(readable)), search.longest(solver.linear.moved @ change)
         if not np.isfinite(size):
             return point, step, False
@@ -313,7 +313,7 @@ def newton(
             if there is None:
                 part *= 0.5
                 continue
-            left = solver.shown(solver.solve(search.residual(there.here, point.here)))
+            left = solver.displacements(solver.solve(search.residual(there.here, point.here)))
             if plain:
                 break
             off = float(np.linalg.norm(left - (1.0 - part) * readable))
@@ -349,7 +349,7 @@ def _polished(search: Search, point: SearchPoint, solver: Solver, change: Array)
         after = float(np.linalg.norm(search.residual(there.here, point.here) / sizes))
         if not after < left:
             break
-        point, left, enough = there, after, after > 0.5 * left or largest(solver.shown(change)) <= ARRIVED
+        point, left, enough = there, after, after > 0.5 * left or largest(solver.displacements(change)) <= ARRIVED
         if enough:
             break
         solver = Solver(search.linearize(point))

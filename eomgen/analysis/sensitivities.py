@@ -273,12 +273,12 @@ def start_sensitivity(
               for name in fixed if name in layout.q}  # fmt: skip
 
     def solve(
-        J: Array, off: Array, lines: slice, own: Mapping[str, list[int]], cut: Sequence[str], first: int
+        J: Array, off: Array, lines: slice, of_tree: Mapping[str, list[int]], cut: Sequence[str], first: int
     ) -> Array:
         """The changes (n_v, k) for which all lines of an assembly's equations of one level stay 0."""
         rows, right = [*scales.jacobian(J[lines])], [*(-off[lines] / scales.c[: lines.stop - lines.start, None])]
         for name in fixed:
-            for k in own.get(name, ()):
+            for k in of_tree.get(name, ()):
                 rows.append(np.eye(n_v)[k])
                 right.append(turns.get(k, wanted[name]) / scales.q[k])
             if name in cut:
@@ -571,7 +571,7 @@ def sensitivities(
         _require_same(trajectory, single)
     refuse_lost_branches(bound, forcing, trajectory, columns)
     S = np.array([run.consistent(float(t), trajectory.x[:, j], raw[..., j]) for j, t in enumerate(trajectory.t)])
-    return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), fixed, salts.found)
+    return Sensitivities(trajectory, columns.names, *run.with_outputs(trajectory, S), fixed, salts.crossed)
 
 
 def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Array) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import AssemblyError
 from . import algebra
 from .algebra import Array, Indices, rank
-from .limits.constraints import ACCEPTED, CONTRADICTION, EXACT, GIVEN, MEASURED, SETTLED, STATE, TIKHONOV
+from .limits.constraints import ACCEPTED, CONTRADICTION, CONVERGED, EXACT, FURTHER_ROWS, MEASURED, STATE, TIKHONOV
 from .limits.positions import BESIDE, NULL
 from .scales import Position, Scales, largest, settle
 
@@ -96,7 +96,7 @@ Q = TypeVar("Q")  #: a position, as the system has it
 def close(
     system: Any, q: Q, steps: int = STEPS, damping: float | None = DAMPING, metric: Array | None = None
 ) -> tuple[Q, float]:
-    """Minimise the scaled residual of a :class:`ClosureSystem`, or of equations with the same calls, from q.
+    """Minimize the scaled residual of a :class:`ClosureSystem`, or of equations with the same calls, from q.
 
     Damping at first: 0 where q is near a closed position, so that directions that hardly count do not creep; None for
     steps of least squares, which keep all digits beside singular positions and may lead far away from them.  Steps are
@@ -135,13 +135,13 @@ def close(
         f_trial = e_trial * weights
         gained = float(f @ f - f_trial @ f_trial)
         if not gained > 0.0:  # NaN included
-            if size <= SETTLED:
+            if size <= CONVERGED:
                 break
             damping = max(10.0 * (damping or 0.0), LEAST)
             if damping > MOST:
                 break
             continue
-        converged = size <= SETTLED and largest(e_trial) > 0.5 * size
+        converged = size <= CONVERGED and largest(e_trial) > 0.5 * size
         q, e, J = trial, e_trial, J_trial
         if converged:
             break
@@ -181,7 +181,7 @@ class AssemblyFailure(NamedTuple):
 
     system: ClosureSystem
     guess: Array
-    held: Indices
+    fixed: Indices
     best: Array
     flipped: bool
     names: Sequence[str]
@@ -189,7 +189,7 @@ class AssemblyFailure(NamedTuple):
     restarts: int
 
     def message(self) -> str:
-        raw = self._given(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
+        raw = self._values_text(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
         if self.flipped:
             return (
                 f"the loops close only with the axes of a joint flipped{self._with(raw)}; "
@@ -215,7 +215,7 @@ class AssemblyFailure(NamedTuple):
             )
         dof = len(free.free) - rank(free.evaluate(q)[1]).rank
         y = self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0)
-        near = ", ".join(self._given(q, y, 12 if len(raw) > dof else 6))
+        near = ", ".join(self._values_text(q, y, 12 if len(raw) > dof else 6))
         if len(raw) > dof:
             values = f"{len(raw)} value{'s' if len(raw) != 1 else ''}"
             return (
@@ -260,10 +260,10 @@ class AssemblyFailure(NamedTuple):
     def _with(self, raw: list[str]) -> str:
         return f" with {', '.join(raw)}" if raw else ""
 
-    def _given(self, q: Array, y: Array, digits: int = 6) -> list[str]:
+    def _values_text(self, q: Array, y: Array, digits: int = 6) -> list[str]:
         """Held coordinates and functions; 12 digits are as good as the exact values where they are given back."""
         names = self.names or [f"q[{i}]" for i in range(len(q))]
-        coordinates = [f"{names[i]} = {q[i]:.{digits}g}" for i in self.system.scales.coordinates(self.held)]
+        coordinates = [f"{names[i]} = {q[i]:.{digits}g}" for i in self.system.scales.coordinates(self.fixed)]
         functions = self.system.equations.names if self.system.equations else ()
         return coordinates + [f"{name} = {value:.{digits}g}" for name, value in zip(functions, y, strict=True)]
 
@@ -554,7 +554,7 @@ def assemble_velocity(
     J, base = scales.jacobian(C_q), C_t / scales.c
     if equations is not None:
         J = np.vstack([J, equations.y_q * scales.q / equations.scales[:, None]])
-    inverse = algebra.pinv(J[:, free], rcond=GIVEN)
+    inverse = algebra.pinv(J[:, free], rcond=FURTHER_ROWS)
     for k in np.ndindex(v.shape[1:]):  # column by column, so that each has the bits that it has alone
         x, offset = v[(slice(None), *k)], base
         if equations is not None:

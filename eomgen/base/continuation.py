@@ -12,7 +12,7 @@ from . import algebra
 from .algebra import Array
 from .assembly import DAMPING, ClosureSystem, ConstraintSystem, close, closed
 from .limits.numbers import EPS
-from .limits.positions import BLOCKED, DRIFTED, LEAPS, NULL, UNJUDGED
+from .limits.positions import BLOCKED, DRIFTED, JUMPS, NULL, UNJUDGED
 from .scales import Scales, largest
 from .splines import cubic_piece
 
@@ -102,7 +102,7 @@ def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
 
 # Predictor and corrector with step control (Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2
 # and 6). A step counts only if position and direction come out near to what the points before foretold: near a singular
-# position another branch is near too, but runs in another direction. A singular position itself is leapt over, to the
+# position another branch is near too, but runs in another direction. A singular position is passed by a jump, to the
 # point behind it that continues the motion smoothly, if there is one.
 
 
@@ -124,13 +124,13 @@ class Continuation:
     def __init__(self, curve: PositionCurve, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
         self.curve, self.scales, self.extent, self.fewest = curve, curve.scales, extent, fewest
         self.points = [Point(0.0, start, curve.tangent(0.0, start))]
-        self.leaps: list[tuple[Point, Point]] = []
+        self.jumps: list[tuple[Point, Point]] = []
         self.blocked = False
         rate = largest(self.points[0].tangent.rate / self.scales.q)
         self.step = FIRST / rate if rate > 0.0 else 1.0
 
     def to(self, end: float, steps: int = STEPS) -> bool:
-        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before."""
+        """Go on until s = end, or beyond if a jump ends there; returns False where the way is blocked before."""
         for _ in range(steps):
             here = self.points[-1]
             left = end - here.s
@@ -149,19 +149,19 @@ class Continuation:
                 if result is None:
                     self.blocked = True
                     return False
-                self.leaps.append((here, result))
+                self.jumps.append((here, result))
                 self.step = result.s - here.s
             self.points.append(result)
         return self.points[-1].s >= end
 
     def reach(self, end: float, steps: int = STEPS) -> Point | None:
-        """The point at s = end, found between its ends where a leap goes on; None where the way is blocked before."""
+        """The point at s = end, found between its ends where a jump goes on; None where the way is blocked before."""
         if not self.to(end, steps=steps):
             return None
         last = self.points[-1]
         if last.s == end:
             return last
-        before = self.leaps[-1][0]
+        before = self.jumps[-1][0]
         part = (end - before.s) / (last.s - before.s)
         return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
 
@@ -189,7 +189,7 @@ class Continuation:
     def _extrapolate(self) -> Point | None:
         """A point behind a singular position, as far from it as one before it, that continues the motion smoothly."""
         here = self.points[-1]
-        for size in LEAPS:
+        for size in JUMPS:
             away = (k for k in range(-2, -len(self.points) - 1, -1) if self._moved(k) >= size)
             if (k := next(away, None)) is not None:
                 gap = here.s - self.points[k].s
@@ -225,9 +225,9 @@ class HeldPath:
     ) -> None:
         self.system, self.start, self.scales = system, start, system.scales
         self.end = system.t if end is None else end
-        self.held, target = system.indices(fixed), system.with_values(start, fixed)
+        self.fixed, target = system.indices(fixed), system.with_values(start, fixed)
         closure = system.closure(fixed)
-        self.free, self.values = closure.free, target[self.held]
+        self.free, self.values = closure.free, target[self.fixed]
         self.way = (1.0 - self.free) * self.scales.distance(target, start)  # (n,) scaled
         self.equations = equations = closure.equations
         self.gap = equations.difference(equations.evaluate(start)[0]) if equations else np.empty(0)
@@ -238,13 +238,13 @@ class HeldPath:
 
     def solve(self, s: float, guess: Array) -> Point | None:
         q = np.array(guess)
-        q[self.held] = self.values if s == 1.0 else self.scales.move(self.start, s * self.way)[self.held]
+        q[self.fixed] = self.values if s == 1.0 else self.scales.move(self.start, s * self.way)[self.fixed]
         equations = self.equations and self.equations._replace(values=self.equations.values + (1.0 - s) * self.gap)
         system = ClosureSystem(self._at(s).position, self.scales, self.free, equations)
         for damping in (0.0, DAMPING):
             result, residual = close(system, q, steps=NEWTON, damping=damping)
             if closed(residual):
-                result[self.held] = q[self.held]  # Euler parameters are normalised at each step
+                result[self.fixed] = q[self.fixed]  # Euler parameters are normalized at each step
                 return Point(s, result, self.tangent(s, result))
         return None
 

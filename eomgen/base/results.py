@@ -122,7 +122,7 @@ def same_keys(*names: str) -> dict[str, str]:
 
 DPI = 110  #: dots of a picture in an inch of its figure
 MARGIN = 0.06  #: around what is drawn (inch)
-SHOWN = 72  #: dots in which this inch is shown: sharp on fine screens, and small
+SCREEN_DPI = 72  #: dots in which this inch is shown: sharp on fine screens, and small
 
 
 def image_html(data: bytes, kind: str, width: int | None = None, alternative: str = "picture") -> str:
@@ -154,7 +154,7 @@ def trimmed_png(figure: Any) -> tuple[bytes, int]:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight", pad_inches=MARGIN)
     data = buffer.getvalue()
-    return data, round(SHOWN / DPI * int.from_bytes(data[16:20], "big"))  # IHDR: width, height
+    return data, round(SCREEN_DPI / DPI * int.from_bytes(data[16:20], "big"))  # IHDR: width, height
 
 
 def side_by_side(*parts: str) -> str:

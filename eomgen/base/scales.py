@@ -98,7 +98,7 @@ class Space(NamedTuple):
             result[j : j + 3] = 2.0 * np.arctan2(size, w[0]) / size * w[1:] if size else 0.0
         return result
 
-    def normalised(self, q: Array) -> Array:
+    def normalized(self, q: Array) -> Array:
         result = np.array(q)
         for i, _ in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt(q[i : i + 4] @ q[i : i + 4])

@@ -42,7 +42,7 @@ VERBS = {
 
 
 class Verbs(click.Group):
-    """The group of all verbs, none of which is imported before it is asked for."""
+    """The group of all verbs, none of which is imported before it is requested."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)

@@ -22,7 +22,7 @@ from .output import MODEL, stage
 if TYPE_CHECKING:
     from ..module import Module
 
-SHOWN = 10  #: failures listed
+LISTED = 10  #: failures listed
 MOST_WORKERS = 4096  #: processes of a local cluster
 
 
@@ -95,9 +95,9 @@ def ensemble(
         save_figure(result.plot(plot[0]).figure, plot[1], dpi=150)
     varied, failures = sorted({**values, **axes}), result.failures()
     (table,) = result.tables
-    notes = [str(one) for one in failures[:SHOWN]]
-    if len(failures) > SHOWN:
-        notes.append(f"... and {len(failures) - SHOWN} more of {result.count} failed")
+    notes = [str(one) for one in failures[:LISTED]]
+    if len(failures) > LISTED:
+        notes.append(f"... and {len(failures) - LISTED} more of {result.count} failed")
     work.show(
         float(result.t[-1]),
         table._replace(title=f"{result.count} runs to t = {result.t[-1]:g} s; varied: {', '.join(varied)}"), *notes,

@@ -295,10 +295,10 @@ def _row(
     name: str, degrees_of_freedom: int | None, steps: int | None, seconds: dict[str, float], **run: Any
 ) -> list[str]:
     times = [*map(seconds.get, ("derive", "compile")), seconds.get("script", seconds.get("simulate"))]
-    shown = ["" if s is None else f"{s:.2f}" for s in times]
+    columns = ["" if s is None else f"{s:.2f}" for s in times]
     counts = ["" if n is None else str(n) for n in (degrees_of_freedom, steps)]
     result = "; ".join(["ok", *run["warnings"]]) if run["ok"] else f"exit code {run['exit_code']}: {run['error']}"
-    return [name, counts[0], *shown, counts[1], result]
+    return [name, counts[0], *columns, counts[1], result]
 
 
 def _copy(name: str, result: dict[str, Path], force: bool) -> Path:

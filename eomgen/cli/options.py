@@ -143,7 +143,7 @@ def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ..
 
 
 def require_folder(option: str, file: Path | None, exists: bool = False) -> None:
-    """Fail before the work if a file cannot be written where it is asked for; makes nothing.
+    """Fail before the work if a file cannot be written where it is requested; makes nothing.
 
     Its folder is made when it is written, unless it has to exist.
     """
@@ -551,9 +551,10 @@ def _missing(path: Path) -> str:
     if path.stem in example_files():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
-    names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
-    near = closest(path.name, names)
-    return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
+    files = [p for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
+    stems = {p.stem: p for p in sorted(files, key=lambda p: p.suffix == path.suffix)}  # of one stem, the last
+    near = closest(path.stem, stems)
+    return f"{path}: no such file" + (f"; did you mean {stems[near[0]]}?" if near else "")
 
 
 def _sort_settings(module: Module, settings: dict[str, float]) -> Iterator[dict[str, float] | None]:

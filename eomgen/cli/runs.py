@@ -169,7 +169,7 @@ def tables_of(
 # -- kinematics --------------------------------------------------------------------------------------------------------
 
 COUNT = 201  #: points of a range unless it says
-SHOWN = 9  #: of them on the screen
+ROWS = 9  #: of them on the screen
 
 
 @verb(POSITIONS)
@@ -210,7 +210,7 @@ def kinematics(
 
 
 def _range_values(module: Module, requested: list[Span]) -> dict[str, Any]:
-    """Arrays over the ranges asked for, by name; of the time where drivers leave nothing free."""
+    """Arrays over the ranges requested, by name; of the time where drivers leave nothing free."""
     if not requested:
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
@@ -253,7 +253,7 @@ def _tables_of_motion(motion: KinematicAnalysis) -> tuple[ResultTable, ResultTab
         rows.append(("", f"and {len(motion.singular) - 20} more singular positions"))
     names = [n for n in _final_names(motion) if not n.endswith("_dot")][:8]
     header = [n + (f" ({motion.units[n]})" if n in motion.units else "") for n in ("t", *names)]
-    picked = np.unique(np.linspace(0, len(motion) - 1, SHOWN).round().astype(int))
+    picked = np.unique(np.linspace(0, len(motion) - 1, ROWS).round().astype(int))
     if len(picked) < len(motion):
         rows.append(("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all"))
     units = [motion.units.get(n, n) for n in ("t", *names)]

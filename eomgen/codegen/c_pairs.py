@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ..base.kernel_table import WITNESS
 from ..base.limits.runs import APART, BEYOND, NEAR, OUTSIDE, UP_TO, WITHIN
-from ..contact.pair_features import CHOSEN, OTHER, OWN
+from ..contact.pair_features import CHOSEN, FIRST, OTHER
 from ..contact.pair_sums import MEETING, MOTION, NEVER, PLACE, POSE, REST, SORTED
 from ..contact.pairs import PairFunction, PairKind, PairPart
 from ..expr.core import Expr
@@ -159,7 +159,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
                 "corners": (*kind.corners, 0, 0)[:2],
                 "lines": kind.lines,
                 "law": kind.law,
-                "held": [written([(at,) for at in places]) | {"columns": 1} for places in kind.held],
+                "held": [written([(at,) for at in places]) | {"columns": 1} for places in kind.offsets],
                 "laws": numbers.values(),
             }
         )
@@ -180,7 +180,7 @@ def _file(program: Program, used: UsedSum, again: SumAgain | None) -> str:
         "STATED": max(kind.states for kind in function.kinds),
         "CORNERS": max((max(kind.corners) for kind in function.kinds if len(kind.corners) == 2), default=1),
         "MOST": max(sorted_counts, default=1),
-        "ROOM": function.room,
+        "ROOM": function.capacity,
         "SLOPES": int(used.slopes),
         "LISTS": int(used.lists),
         "MEETS": int(used.meets),
@@ -281,7 +281,7 @@ def _law(
         law_length = len(kind.law) + kind.states  # states stand behind the numbers of the law
         shape = tables[kind.first if letter == "a" else kind.second]["length"]
         if len(kind.corners) == 2:
-            shape = POSE + (OWN if letter == "a" else OTHER)
+            shape = POSE + (FIRST if letter == "a" else OTHER)
         elif kind.corners and letter == "a":
             shape = POSE + CHOSEN
         step = law_length if letter in "ls" else shape

@@ -656,7 +656,7 @@ class BranchPrinter(BlockPrinter):
         result.append(f"const both {name} = {text};")
         return name
 
-    def _own(self, a: int) -> Operand:
+    def _pair(self, a: int) -> Operand:
         return (a, self._second[a], self._sign[a])
 
     def _vector(self, operand: Operand, piece: PrintedFunction, loaded: set[int], result: list[str]) -> str:
@@ -667,7 +667,7 @@ class BranchPrinter(BlockPrinter):
         if operand in self._both:
             return self._both[operand]
         if x in self._second:
-            at = self._own(x)
+            at = self._pair(x)
             if at not in self._both:
                 self._new(at, f"both_at(w + {piece.loads[x]})", result)
             return self._both[at] if at == operand else self._new(operand, f"both_turned({self._both[at]})", result)
@@ -684,8 +684,8 @@ class BranchPrinter(BlockPrinter):
             self._single.add(i)
             self._name_waiting(result)
             minus = "-" if i != a and self._sign[a] < 0 else ""
-            if self._own(a) in self._both:
-                text = f"{'first' if i == a else 'second'}_of({self._both[self._own(a)]})"
+            if self._pair(a) in self._both:
+                text = f"{'first' if i == a else 'second'}_of({self._both[self._pair(a)]})"
             else:
                 text = f"w[{piece.loads[i]}]"
             result.append(f"const real {self._name(i)} = {minus}{text};")
@@ -700,10 +700,10 @@ class BranchPrinter(BlockPrinter):
         kind = self._nodes[i][0]
         b = self._second[i]
         if kind in CIRCULAR:
-            name = self._new(self._own(i), self._circular(kind, *self._operands[i][0][:2]), result)
+            name = self._new(self._pair(i), self._circular(kind, *self._operands[i][0][:2]), result)
         else:
             texts = [self._vector(operand, piece, loaded, result) for operand in self._operands[i]]
-            name = self._new(self._own(i), f"{FORMS[kind]}({', '.join(texts)})", result)
+            name = self._new(self._pair(i), f"{FORMS[kind]}({', '.join(texts)})", result)
         minus = "-" if self._sign[i] < 0 else ""
         for k, text in ((i, f"first_of({name})"), (b, f"{minus}second_of({name})")):
             if k in piece.checks:

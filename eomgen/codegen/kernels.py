@@ -105,7 +105,7 @@ def _squares(terms: SystemTerms) -> list[Expr]:
     return [e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3] for e in sets]
 
 
-def _normalised(terms: SystemTerms) -> list[Expr]:
+def _normalized(terms: SystemTerms) -> list[Expr]:
     """q with Euler parameters of length 1, and v."""
     q = terms.symbols(terms.q)
     for (i, _), square in zip(terms.quaternion_slots, _squares(terms), strict=True):
@@ -153,14 +153,14 @@ EXPRESSIONS: Mapping[str, Expressions] = {
 }
 #: Kernels that are straight-line code of every tree.
 OF_TREES: Mapping[str, Expressions] = {
-    "project": _normalised,
+    "project": _normalized,
     "embedded_mass_matrix": lambda s: [s.mass_matrix[i][k] for i in s.preferred for k in s.preferred],
     "kinematics": lambda s: s.symbols((*s.q, *s.v, *s.a)),
 }
 
 
 class BlockMaker:
-    """Makes the blocks of one system, each when it is asked for."""
+    """Makes the blocks of one system, each when it is requested."""
 
     def __init__(self, terms: SystemTerms, limits: Limits) -> None:
         self.terms, self.limits = terms, limits

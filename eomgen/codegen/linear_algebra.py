@@ -243,12 +243,12 @@ class Apart(NamedTuple):
 
 
 class _Taken(NamedTuple):
-    """x[columns] = inverse b[rows] - across x[others]; b[left] = free b[rows]."""
+    """x[columns] = inverse b[rows] - coupling x[others]; b[left] = free b[rows]."""
 
     front: Front
     inverse: list[Row]
     free: list[Row]
-    across: list[Row]
+    coupling: list[Row]
 
 
 class OrthogonalFactor:
@@ -270,10 +270,10 @@ class OrthogonalFactor:
             block = [[row.get(k, graph.zero) for k in front.columns] for row in taken]
             inverse, free, apart = _split(block)
             beside = [{k: row[k] for k in front.others if k in row} for row in taken]
-            across = [_combined(part, beside) for part in inverse]
+            coupling = [_combined(part, beside) for part in inverse]
             for i, part in zip(front.left, free, strict=True):
                 rows_left[i] = _combined(part, beside)
-            self._taken.append(_Taken(front, inverse, free, across))
+            self._taken.append(_Taken(front, inverse, free, coupling))
             self.apart += [Apart(tuple(front.columns[k] for k in x.columns), x.before, x.square) for x in apart]
 
     def solve(self, right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
@@ -286,8 +286,8 @@ class OrthogonalFactor:
             values.append([_product(part, known, zero) for part in inverse])
             b.update(zip(front.left, (_product(part, known, zero) for part in free), strict=True))
         x = [zero] * self.n
-        for (front, _, _, across), value in zip(reversed(self._taken), reversed(values), strict=True):
-            for k, total, row in zip(front.columns, value, across, strict=True):
+        for (front, _, _, coupling), value in zip(reversed(self._taken), reversed(values), strict=True):
+            for k, total, row in zip(front.columns, value, coupling, strict=True):
                 for j, entry in row.items():
                     if not x[j].is_zero:
                         total = total - entry * x[j]

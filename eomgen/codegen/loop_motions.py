@@ -141,13 +141,13 @@ class MotionLoops(LoopBlocks):
         parallel, or short beside others, nor so that they move many times as fast.
         """
         graph, s = self.terms.graph, self.s
-        result = self._across(LOST if self._in_a_row else CROSSINGS_NEAR_SQUARE)
+        result = self._independent(LOST if self._in_a_row else CROSSINGS_NEAR_SQUARE)
         for j, k in enumerate(self.terms.preferred):
             square = self._products[j][j] * (s[k] * s[k])
             result.append(graph.apply("lt", square, graph.constant(SPREAD * SPREAD)))
         return result
 
-    def _across(self, limit: float) -> list[Expr]:
+    def _independent(self, limit: float) -> list[Expr]:
         """Whether every column has more than this part of its square across those before it."""
         graph, s = self.terms.graph, self.s
         scales = [s[k] * s[k] for k in self.dependent]
@@ -190,7 +190,7 @@ class MotionLoops(LoopBlocks):
         a, checks = embedded_accelerations(terms, self._motions, particular, here[: terms.n_v], self._legs)
         conditions += self._follows()
         if self._in_a_row:  # else columns tell already that no change point is near
-            columns = self.all_of(self._across(CROSSINGS_NEAR_SQUARE))
+            columns = self.all_of(self._independent(CROSSINGS_NEAR_SQUARE))
             conditions.append(terms.graph.apply("or", columns, self.separate_rows()))
         if self.redundant:  # whose rates may contradict each other
             rate = self.scaled(terms.constraint_rate)

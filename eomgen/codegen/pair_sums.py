@@ -121,14 +121,14 @@ def work_of(function: PairFunction) -> int:
 
 def slots_of(function: PairFunction) -> int:
     """Numbers for which columns of a derivative at one place have room: so many for each pair that has room."""
-    return SLOTS * function.room + function.results
+    return SLOTS * function.capacity + function.results
 
 
 def kept_of(function: PairFunction) -> int:
     """Numbers that derivatives at one place keep: shapes, their rates, near pairs with what they exert, and columns."""
     shapes = sum(len(rows) * placed_length(rows) for rows in function.tables)
     columns = 2 * function.count + function.bodies + function.results + 2 + slots_of(function)
-    return 2 * shapes + record_of(function) * function.room + columns
+    return 2 * shapes + record_of(function) * function.capacity + columns
 
 
 def record_of(function: PairFunction) -> int:
@@ -251,7 +251,7 @@ def has_columns(program: Program, function: PairFunction) -> bool:
 
 def room_of_states(function: PairFunction) -> int:
     """For how many states of near pairs there is room."""
-    return function.room * max(kind.states for kind in function.kinds)
+    return function.capacity * max(kind.states for kind in function.kinds)
 
 
 def contact_areas(program: Program) -> list[tuple[str, int]]:

@@ -126,7 +126,7 @@ def print_pair_sum(program: Program, function: PairFunction) -> str:
     tables = "".join(f"        {table!r},\n" for table in function.tables)
     listed = f"(\n{tables}    ),\n    (\n{''.join(kinds)}    ),"
     states = f"    {function.states},\n" if function.states else ""
-    made = f"PairSum(\n    {function.bodies},\n    {listed}\n    {function.room},\n{states})"
+    made = f"PairSum(\n    {function.bodies},\n    {listed}\n    {function.capacity},\n{states})"
     return "\n\n".join([*texts, f"pairs_{function.name} = {made}"])
 
 

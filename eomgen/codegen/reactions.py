@@ -45,11 +45,11 @@ def solve_multipliers(rows: Sequence[Sequence[Expr]], forces: Sequence[Expr]) ->
     return factorize_tree(gram, range(-1, len(rows) - 1)).solve([-dot(row, forces) for row in rows])
 
 
-def multiplier_values(given: Sequence[str], kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
+def multiplier_values(multipliers: Sequence[str], kinematics: Kinematics, equations: TreeEquations) -> dict[Expr, Expr]:
     """What the named multipliers of a model stand for."""
     graph = kinematics.graph
     values = solve_multipliers(kinematics.constraints.jacobian, equations.inverse_dynamics)
-    names = {f"constraint_{k + 1}": name for k, name in enumerate(given)}
+    names = {f"constraint_{k + 1}": name for k, name in enumerate(multipliers)}
     return {
         graph.symbol(names[label]): value for label, value in zip(kinematics.constraints.labels, values, strict=True)
     }
@@ -100,7 +100,7 @@ def refuse_undetermined(
 
 
 def _depends(result: Sequence[Expr], values: Mapping[Expr, Expr], on: Sequence[Expr]) -> bool:
-    """Whether what is asked for depends on such multipliers."""
+    """Whether what is requested depends on such multipliers."""
     slopes = list(jacobian(substitute(list(result), dict(values)), list(on)).values())
     return not all(vanishes(_with_every_choice(slopes), SYSTEMS_UNTOUCHED, pieces=True))
 
@@ -324,7 +324,7 @@ def with_reactions(kinematics: Kinematics, mobility: Mobility) -> Kinematics:
     linear = replace(linear, forces=(*linear.forces, *switched))
     symbols = [graph.symbol(name) for name in names]
     values, known, after = list[Expr](), dict[Expr, Expr](), dict[str, tuple[tuple[str, Expr], ...]]()
-    if not (names or laws or rows):  # what is asked for is 0 in every state: the moment about a hinge
+    if not (names or laws or rows):  # what is requested is 0 in every state: the moment about a hinge
         pass
     elif laws or rows or kinematics.constraints.labels or _before_accelerations(mechanism):
         reactions, multipliers = _reactions(

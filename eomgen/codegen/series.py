@@ -45,7 +45,7 @@ class Series:
 
 
 def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = False) -> set[int]:
-    """The terms that roots are made of, with what their recurrences need; only those that change, if asked for."""
+    """The terms that roots are made of, with what their recurrences need; only those that change, if requested."""
     result: set[int] = set()
     open_ends = list(roots)
     while open_ends:

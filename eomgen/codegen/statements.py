@@ -108,7 +108,7 @@ class _Finder:
     def __init__(self, program: Program, sequence: Sequence[int]) -> None:
         self.nodes, self.sequence = program.graph.nodes, sorted(sequence)
         self.inside = frozenset(sequence)
-        self.given = program.parameter_only
+        self.constant = program.parameter_only
         self.second: dict[int, int] = {}
         self.first: dict[int, int] = {}
         self.sign: dict[int, int] = {}
@@ -124,7 +124,7 @@ class _Finder:
 
     def _stand_in(self, k: int) -> int | str:
         """What stands for an operand in a key: numbers, and what parameters alone make, may differ."""
-        return "number" if self.nodes[k][0] == "const" else "given" if k in self.given else k
+        return "number" if self.nodes[k][0] == "const" else "given" if k in self.constant else k
 
     def _key(self, operation: str, operands: Iterable[int | str]) -> tuple[int | str, ...]:
         kind = PAIRED[operation]
@@ -184,7 +184,7 @@ class _Finder:
             self.join(i, like[0][0])
 
     def _is_free(self, k: int) -> bool:
-        return self.nodes[k][0] == "sym" and k not in self.given and k not in self.second and k not in self.first
+        return self.nodes[k][0] == "sym" and k not in self.constant and k not in self.second and k not in self.first
 
     def _aligned(self, a: int, b: int) -> tuple[Sequence[int], Sequence[int], bool]:
         """The operands of a pair in the order in which they belong together, and whether those of b change places."""
@@ -204,7 +204,7 @@ class _Finder:
         return (in_order or kind in "+*") and all(self.second.get(x, y) == y for x, y in operands)
 
     def set_signs(self) -> None:
-        """The sign of every second element, and the operands; products with numbers take the sign that is asked for."""
+        """The sign of every second element, and the operands; products with numbers take the sign that is requested."""
         nodes = self.nodes
         free: set[int] = set()
         for a in sorted(k for k in self.second if k in self.inside):
@@ -249,7 +249,7 @@ class _Finder:
         angles = [k for i in self.sequence if nodes[i][0] in ("sin", "cos") for k in nodes[i][1:]]
         while angles:
             k = angles.pop()
-            if k in self.inside and k not in self.given and (k in self.operands or k in self.first):
+            if k in self.inside and k not in self.constant and (k in self.operands or k in self.first):
                 self.operands.pop(self.first.get(k, k), None)
                 angles.extend(nodes[k][1:])
         self.joined = set(self.operands)

@@ -349,11 +349,11 @@ def resolved(unresolved: Sequence[Expr], kinematics: Kinematics, equations: Tree
         graph.symbol("potential_energy()"): equations.potential_energy,
         graph.symbol("total_energy()"): equations.kinetic_energy + equations.potential_energy,
     }
-    given = kinematics.mechanism.given
-    if given is not None and given.multipliers:
+    source = kinematics.mechanism.given
+    if source is not None and source.multipliers:
         from .reactions import multiplier_values
 
-        energies |= multiplier_values(given.multipliers, kinematics, equations)
+        energies |= multiplier_values(source.multipliers, kinematics, equations)
     return tuple(substitute(expressions, energies))
 
 

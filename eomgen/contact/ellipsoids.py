@@ -12,7 +12,7 @@ from ..expr.core import Expr, sqrt
 from ..expr.vectors import Mat3, Vec3
 from .limits import ASIDE, BACK, COMMON, EQUAL, FOCAL, NEAREST, NOWHERE, PLAIN, POLISHED, TWICE, UNIQUE
 from .point import Contact, Touch
-from .rounds import along_axis, direction, seen_from, settled
+from .rounds import along_axis, converged, direction, seen_from
 
 # -- ellipsoids --------------------------------------------------------------------------------------------------------
 
@@ -77,7 +77,7 @@ def nearest(view: View, axes: Sequence[Expr], place: Sequence[Expr]) -> tuple[tu
 
     t = begin
     for k in range(NEAREST):
-        t = settled(view, t) if k == NEAREST - 1 else t
+        t = converged(view, t) if k == NEAREST - 1 else t
         parts, total = parts_at(t)
         slope = sum((s * s / (t + q) for s, q in zip(parts, squares, strict=True)), graph.zero)
         rising = graph.apply("lt", 0.0, slope)  # but at the centre
@@ -157,7 +157,7 @@ def silhouette_normal(view: View, r: tuple[Expr, Expr], form: tuple[Expr, Expr, 
     nx, ny = c * along - s * aside, s * along + c * aside
     for k in range(POLISHED):
         if k == POLISHED - 1:
-            nx, ny = settled(view, nx), settled(view, ny)
+            nx, ny = converged(view, nx), converged(view, ny)
         bx, by = bxx * nx + bxy * ny, bxy * nx + byy * ny
         h = sqrt(nx * bx + ny * by)
         gx, gy = r[0] - bx / h, r[1] - by / h
@@ -276,7 +276,7 @@ class EllipsoidEllipsoid(Contact):
         for _ in range(PLAIN - 1):
             n = self._step(forms, reach, n)[0]
         x, y, z = n
-        n = self._step(forms, reach, (settled(view, x), settled(view, y), settled(view, z)))[0]
+        n = self._step(forms, reach, (converged(view, x), converged(view, y), converged(view, z)))[0]
         near, other = (vec.times(B, n) for B in forms)
         return n, (sqrt(vec.dot(n, near)), sqrt(vec.dot(n, other))), (near, other, reach)
 
@@ -407,13 +407,13 @@ class BlockEllipsoid(Contact):
         a, b, c = (1.0 / k for k in self.axes)
         form = quadratic_form(turn, (a, b, c))
 
-        def held(k: int, x: Expr) -> Expr:
+        def clamped(k: int, x: Expr) -> Expr:
             return graph.apply("max", -self.halves[k], graph.apply("min", self.halves[k], x))
 
-        least = [held(k, place[k]) for k in range(3)]
+        least = [clamped(k, place[k]) for k in range(3)]
         amount = self._amount(form, place, least)
         for points in self._points(form, place):
-            points = [held(k, x) for k, x in enumerate(points)]
+            points = [clamped(k, x) for k, x in enumerate(points)]
             whole = self._amount(form, place, points)
             smaller = graph.apply("lt", whole, amount)
             amount = where(smaller, whole, amount)

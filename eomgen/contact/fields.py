@@ -22,7 +22,7 @@ from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import quadratic_form
 from .limits import ASTRAY, FOOT, NOWHERE, STEEP
 from .point import Contact, Touch
-from .rounds import seen_from, settled
+from .rounds import converged, seen_from
 
 #: Symbols of a place in the expression of a height, and the names by which texts know them.
 PLACES = {"x": "x[height]", "y": "y[height]"}
@@ -127,7 +127,7 @@ class FieldContact(Contact):
         det = where(good, det, plain)
         return x - (jyy * fx - jxy * fy) / det, y - (jxx * fy - jyx * fx) / det, good
 
-    def _found(self, view: View) -> tuple[Vec3, Expr, Vec3, Vec3, Expr, Expr]:
+    def _closest(self, view: View) -> tuple[Vec3, Expr, Vec3, Vec3, Expr, Expr]:
         """Normal, depth and the shape's point, in axes of the first marker; the way between markers; whether found.
 
         The last number says whether all steps lay where the distance has one minimum: then depths are continuous.
@@ -139,7 +139,7 @@ class FieldContact(Contact):
         unique = graph.one
         for k in range(FOOT):
             if k == FOOT - 1:
-                x, y = settled(view, x), settled(view, y)
+                x, y = converged(view, x), converged(view, y)
             x, y, good = self._step(x, y, place, view)
             unique = graph.apply("and", unique, good)
         h, hx, hy, *_ = self.field.at(x, y)
@@ -155,11 +155,11 @@ class FieldContact(Contact):
 
     def deepest(self, view: View) -> Expr:
         """Nothing where the start or a step lies in a hollow that is sharper than the shape."""
-        return where(self._found(view)[-1], NOWHERE, 0.0)
+        return where(self._closest(view)[-1], NOWHERE, 0.0)
 
     def touch(self, view: View) -> Touch:
         R = view.rotation(self.first)
-        n, depth, radius, reach, *_ = self._found(view)
+        n, depth, radius, reach, *_ = self._closest(view)
         normal = vec.times(R, n)
         second = vec.add(vec.times(R, radius), vec.scale(0.5 * depth, normal))
         return normal, depth, vec.add(reach, second), second
@@ -173,7 +173,7 @@ class FieldContact(Contact):
         """
         graph = view.graph
         R = view.rotation(self.first)
-        n, depth, radius, reach, good, _ = self._found(view)
+        n, depth, radius, reach, good, _ = self._closest(view)
         _, _, place = seen_from(self, view)
         beneath = self.field.at(place[0], place[1])[0]
         over = STEEP * (place[2] - beneath) - sqrt(vec.dot(radius, radius))

@@ -225,7 +225,7 @@ class ContactGroups(Force):
 
     @cached_property
     def _made(self) -> dict[str, tuple[PairFunction, list[Expr]]]:
-        """Sums over pairs, by what of them is asked for, and what they are given beside the motion of bodies."""
+        """Sums over pairs, by what of them is requested, and what they are given beside the motion of bodies."""
         return {}
 
     def _operands(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], PairFunction, list[Expr]]:
@@ -245,10 +245,10 @@ class ContactGroups(Force):
             data = _SharedData(len(operands), graph)
             self._made[part] = self._function(f"{part}{self.name}", bodies, data, bool(part)), data.values
         function, shared = self._made[part]
-        states = [graph.zero] * function.states if still else self._held(graph)  # the energy does not depend on states
+        states = [graph.zero] * function.states if still else self._all(graph)  # the energy does not depend on states
         return markers, function, [*operands, *shared, *states]
 
-    def _held(self, graph: Graph) -> list[Expr]:
+    def _all(self, graph: Graph) -> list[Expr]:
         """The states of all pairs; the number of pieces that touch is found, so 0 stands in its place."""
         result: list[Expr] = []
         for k in range(0, len(self.states), self._each or 1):
@@ -276,14 +276,14 @@ class ContactGroups(Force):
                     kind = pair_kind(law, (first, second), (i, j), sizes, data.place, lost, height)
                     if self.on_bed:
                         places = tuple(self._slots * x.column for x in these)
-                        kind = replace(kind, held=(places, (0,) * len(other)), lines=_lines(these))
+                        kind = replace(kind, offsets=(places, (0,) * len(other)), lines=_lines(these))
                     elif self.states:
                         block = blocks[g, h, class_of(first.name, second.name), second.name]
                         rows = tuple(self._slots * block.of_first(x.number, x.column) for x in these)
                         columns = tuple(self._slots * block.places * x.column for x in other)
-                        kind = replace(kind, held=(rows, columns))
+                        kind = replace(kind, offsets=(rows, columns))
                     kinds.append(kind)
-        states = [x.value for x in self._held(data.graph)]
+        states = [x.value for x in self._all(data.graph)]
         numbers = (*(x.value for x in data.values), *states)
         return PairFunction(name, len(bodies), numbers, tuple(tables), tuple(kinds), len(states))
 

@@ -19,7 +19,7 @@ FLAT_CORNER = 1e-13
 EVEN = 1e-9
 #: Part of the room inside a smooth outline, measured between points of its arcs, that is taken to be there: of 12
 #: points to an arc of up to 180 degrees the nearest two are 15 degrees apart, and 1 / cos(15 deg) is 1.035.
-ROOM = 0.9
+INSIDE = 0.9
 #: (m) How far a shape is from a piece of a profile that is not its nearest, for those who look for what is near.
 NOWHERE = 1e100
 #: Times the depth of a profile down to which forces are undefined: stages of DOP853 and RK45 are at most 2.7 times as

@@ -19,7 +19,7 @@ EDGE = 5  #: numbers of an edge of a polygon: its first corner, its outward norm
 FACING = 10
 #: Numbers of the first polygon that the law reads: the edge that faces the other, the corner of the least overlap, that
 #: of the next, corner and normal of the edge of the next, whether an edge of the second has the least, and the next.
-OWN = FACING + 10
+FIRST = FACING + 10
 #: The same of the second, without the last two, and how far its corners are from its marker.
 OTHER = FACING + 9
 

@@ -19,7 +19,7 @@ from ..expr.vectors import Mat3, Vec3
 from .ellipsoids import BlockEllipsoid, EllipsoidEllipsoid, EllipsoidPlane, EllipsoidRod, EllipsoidRound
 from .fields import FieldEllipsoid, FieldRound, planted
 from .limits import NOWHERE
-from .pair_features import CHOSEN, EDGE, OTHER, OWN, PIECE
+from .pair_features import CHOSEN, EDGE, FIRST, OTHER, PIECE
 from .pair_sums import POSE
 from .pairs import PairKind
 from .point import Contact, SpherePlane, joint_radius
@@ -47,7 +47,7 @@ from .states import BED_CELL, BLOCK, CORE, FIELD, INSIDE, POLYGON, FeatureKind, 
 HOLLOWS = ("inner_corner", "hollow_arc")
 
 
-class Given(NamedTuple):
+class FeaturePair(NamedTuple):
     """What the contact of two features is made of."""
 
     laws: tuple[str, Marker, Marker, NormalLaw, DryFriction | None]
@@ -60,20 +60,20 @@ class Given(NamedTuple):
     ground: bool  #: whether the first is a piece of a profile
 
 
-Make = Callable[[Given], Contact]
+Make = Callable[[FeaturePair], Contact]
 
 
 def _each(first: str, second: Sequence[str], make: Make) -> dict[tuple[str, str], Make]:
     return {(first, one): make for one in second}
 
 
-def _on_core(g: Given) -> Contact:
+def _on_core(g: FeaturePair) -> Contact:
     """On a core with half lengths and a radius as sizes."""
     *halves, radius = g.first
     return CoreRound(*g.laws, tuple(halves), (radius, g.radius))
 
 
-def _two_rods(g: Given) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]]:
+def _two_rods(g: FeaturePair) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]]:
     return (g.first[0], g.second[0]), (g.first[1], g.second[1])
 
 
@@ -85,7 +85,7 @@ def _in_hollow(kind: type[ProfilePiece]) -> Make:
     return lambda g: kind(*g.laws[:3], PartlyDamped(g.laws[3], g.radius.graph.zero), None, g.first, g.radius)
 
 
-def _wheel_on_edge(g: Given) -> Contact:
+def _wheel_on_edge(g: FeaturePair) -> Contact:
     """On soil, which has no energy that parts could share."""
     return EdgeRound(*g.laws, (*g.first[:WALLS], g.radius.graph.zero, *g.first[WALLS + 1 :]), g.radius, g.ground)
 
@@ -138,7 +138,7 @@ class ShapeMotion(NamedTuple):
     angular_velocity: Vec3
 
 
-def touching(names: tuple[str, str], raw: Given) -> Contact:
+def touching(names: tuple[str, str], raw: FeaturePair) -> Contact:
     """The contact of one feature with another at one of its places, by laws that are not yet of their radii."""
     normal, friction = raw.laws[3:]
     normal = normal.at(lambda: joint_radius(raw.first[0], raw.radius) if names[0] == "round" else raw.radius)
@@ -239,8 +239,8 @@ class _PairView:
         self._poses = [self._pose(letter) for letter in "ab"]
         self._rounded: dict[Expr, Expr] = {}
 
-    def settled(self, x: Expr) -> Expr:
-        """A symbol for a number to which iterations came; see :func:`~.rounds.settled`."""
+    def converged(self, x: Expr) -> Expr:
+        """A symbol for a number to which iterations came; see :func:`~.rounds.converged`."""
         if x.value is not None:
             return x
         result = next((symbol for symbol, known in self._rounded.items() if known.id == x.id), None)
@@ -350,23 +350,23 @@ def pair_kind(
     view = cast(View, pair)  # contacts ask for markers alone, not for angles and coordinates of joints
     places: list[int] = []
 
-    def own(x: Expr) -> Expr:
+    def local(x: Expr) -> Expr:
         if x.value is not None:
             return graph.constant(x.value)
         places.append(place(x))
         return graph.symbol(f"l{len(places) - 1}")
 
     frame = Frame.identity(graph)
-    normal = law.normal.mapped(own)
-    rigid = [graph.zero if x is None else own(x) for x in law.rigid]
-    friction = None if law.friction is None else law.friction.mapped(own)
-    field = None if height is None else planted(height, graph, own)
+    normal = law.normal.mapped(local)
+    rigid = [graph.zero if x is None else local(x) for x in law.rigid]
+    friction = None if law.friction is None else law.friction.mapped(local)
+    field = None if height is None else planted(height, graph, local)
     markers = (Marker(0, frame, "a"), Marker(1, frame, "b"))
     lateral = vec.transpose(view.rotation(markers[0]))[0 if names[0] == "half" else 2] if law.planar else None
     polygons = names == (POLYGON, POLYGON)
     inside, ground = names[0] == INSIDE, names[0] in ("edge", "arc") and kinds[0].number > 0
     corners = (sizes[0] // EDGE, sizes[1] // EDGE) if polygons else (sizes[0] // PIECE,) if inside else ()
-    sizes = (OWN, OTHER) if polygons else (CHOSEN, sizes[1]) if inside else sizes
+    sizes = (FIRST, OTHER) if polygons else (CHOSEN, sizes[1]) if inside else sizes
     raw = [tuple(graph.symbol(f"{letter}{POSE + k}") for k in range(n)) for letter, n in zip("ab", sizes, strict=True)]
     out = vec.transpose(view.rotation(markers[names[0] == "half"]))[2] if law.planar else vec.zero(graph)
     exerted: list[list[Expr]] = []
@@ -380,7 +380,7 @@ def pair_kind(
         dry, push = law.holding(normal, friction, states[: law.each], lateral) if states else (friction, normal)
         sides = (law.name, *markers)
         laws = (*sides, push, dry)
-        one = Given(laws, raw[0], raw[1], raw[1][0], witness, field, pair.height if flat else None, ground)
+        one = FeaturePair(laws, raw[0], raw[1], raw[1][0], witness, field, pair.height if flat else None, ground)
         contact = touching(names, one)
         on_cell = isinstance(contact, SoilCell)
         if flat and not on_cell:

@@ -44,7 +44,7 @@ def cross(a: Any, b: Any) -> np.ndarray:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def across(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def row_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products of vectors (n, 3, ...)."""
     return cross(a.swapaxes(0, 1), b.swapaxes(0, 1)).swapaxes(0, 1)
 
@@ -83,14 +83,14 @@ class PairSum:
     tables : sequence of (n, PLACE + sizes + REST) integers
         Shapes of one kind: body, then places in the data of the position (3) and rotation (9) in the body, of the
         sizes, of the radius of a sphere that bounds the shape (-1: none does), and of the thickness of the body.
-    kinds : sequence of (first, second, planar, thin, law, value, slope, touch, witness), with states (states, held) too
+    kinds : sequence of (first, second, planar, thin, law, value, slope, touch, witness), or also (states, offsets)
         Tables of the first and the second shape; in which directions distances count (0 all, 1 across z of the first, 2
         beside columns that reach down along y of the first without end); how thin the first is (see ``PairKind``);
         places of the law's numbers; the function of one pair and its directional derivative, of the
         numbers of the first shape, of the second, of the law, and of the pair's states (and of their rates in the same
         order); normal, penetration and turning radius of the pair; the ``WITNESS`` numbers of :meth:`witnesses`; how
         many states a pair has, and the numbers of the rows of both tables whose sum is the place of its states.
-    room : int
+    capacity : int
         How many pairs :meth:`witnesses` has room for.
     states : int, optional
         How many states all pairs have; they are the last of the data, and their rates the last of the results.
@@ -99,10 +99,10 @@ class PairSum:
     def __init__(
         self, bodies: int, tables: Sequence[Any], kinds: Sequence[tuple[Any, ...]], capacity: int, states: int = 0
     ):
-        self.bodies, self.room, self.states = bodies, capacity, states
+        self.bodies, self.capacity, self.states = bodies, capacity, states
         self.tables = [np.array(table, dtype=int) for table in tables]
         self.kinds = [(*kind[:9], *self._pairs(*kind[:2])) for kind in kinds]
-        self.held = [(kind[9], *(np.array(rows) for rows in kind[10])) if states else None for kind in kinds]
+        self.offsets = [(kind[9], *(np.array(rows) for rows in kind[10])) if states else None for kind in kinds]
 
     def _pairs(self, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
         return pairs_of_rows(self.tables[first], self.tables[second], first == second)
@@ -175,9 +175,12 @@ class PairSum:
                 numbers = [*a.swapaxes(0, 1), *b.swapaxes(0, 1), *data[list(law)][:, None]]
                 nx, ny, nz, depth, radius = _table(touch(numbers), len(i), data)
                 normal, turning = np.stack([nx, ny, nz], axis=1), a[:, 15:18]
-                seen = speed - across(turning, reach)
+                seen = speed - row_cross(turning, reach)
                 felt = (
-                    change - across(spin, reach) - across(turning, across(turning, reach)) - 2.0 * across(turning, seen)
+                    change
+                    - row_cross(spin, reach)
+                    - row_cross(turning, row_cross(turning, reach))
+                    - 2.0 * row_cross(turning, seen)
                 )
                 turned, spun = b[:, 15:18] - turning, motions[tables[1][j, 0]][:, 3:6] - spin
                 rate, own_rate, change_of_rate = (np.sqrt(dot(x, x)) for x in (turned, turning, spun))
@@ -207,18 +210,18 @@ class PairSum:
         return [x if np.ndim(x) else float(x) for x in result]
 
     def witnesses(self, raw: Sequence[Any]) -> list[Any]:
-        """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``room`` numbers or arrays.
+        """How many pairs of shapes are near each other, and where: 1 + ``RECORD`` ``capacity`` numbers or arrays.
 
         Near are pairs that are apart by at most ``NEAR`` times the sum of their thicknesses, ``OUTSIDE`` times where
         one has no far side.  Records that are not used are 0.
         """
         data = _stacked(raw)
-        out = np.zeros((1 + RECORD * self.room, *data.shape[1:]), dtype=data.dtype)
+        out = np.zeros((1 + RECORD * self.capacity, *data.shape[1:]), dtype=data.dtype)
         for column in np.ndindex(data.shape[1:]):
             place = (slice(None), *column)
             rows = self._witnesses(data[place])
             out[(0, *column)] = len(rows)
-            kept = rows[: self.room].ravel()
+            kept = rows[: self.capacity].ravel()
             out[(slice(1, 1 + kept.size), *column)] = kept
         return list(out.tolist()) if out.ndim == 1 else list(out)
 
@@ -251,7 +254,9 @@ class PairSum:
         out = np.zeros((6 * self.bodies + 1 + self.states, *data.shape[1:]), dtype=data.dtype)
         if data.dtype == object:
             out = out + data[0] * 0
-        for (first, second, planar, _, law, value, slope, _, _, i, j), held in zip(self.kinds, self.held, strict=True):
+        for (first, second, planar, _, law, value, slope, _, _, i, j), offsets in zip(
+            self.kinds, self.offsets, strict=True
+        ):
             (a, arm_a, da, d_arm_a), (b, arm_b, db, d_arm_b) = placed[first], placed[second]
             i, j = self._candidates(a, b, planar, (first, second), data) or (i, j)
             near = self._near(a, b, planar, i, j, (self.tables[first], self.tables[second]), data)
@@ -260,7 +265,7 @@ class PairSum:
                 continue
             bodies = self.tables[first][i, 0], self.tables[second][j, 0]
             numbers = [*a[i].swapaxes(0, 1), *b[j].swapaxes(0, 1), *data[list(law)][:, None]]
-            places = [] if held is None else [held[1][i] + held[2][j] + k for k in range(held[0])]
+            places = [] if offsets is None else [offsets[1][i] + offsets[2][j] + k for k in range(offsets[0])]
             begun = len(data) - self.states
             numbers += [data[begun + at] for at in places]
             if rates is None:
@@ -296,7 +301,7 @@ class PairSum:
         local, turn = data[table[:, 1:4]], data[table[:, 4:PLACE]].reshape(len(table), 3, 3, *data.shape[1:])
         p, R, v, w = parts(poses)
         arm = times(R, local)
-        numbers = [p + arm, flat(product(R, turn)), v + across(w, arm), w, data[table[:, PLACE:-REST]]]
+        numbers = [p + arm, flat(product(R, turn)), v + row_cross(w, arm), w, data[table[:, PLACE:-REST]]]
         if rates is None:
             return np.concatenate(numbers, axis=1), arm, None, None
         moving = rates[: POSE * self.bodies].reshape(self.bodies, POSE, *rates.shape[1:])[table[:, 0]]
@@ -307,7 +312,7 @@ class PairSum:
         changes = [
             dp + d_arm,
             flat(product(dR, turn) + product(R, d_turn)),
-            dv + across(dw, arm) + across(w, d_arm),
+            dv + row_cross(dw, arm) + row_cross(w, d_arm),
             dw,
             rates[table[:, PLACE:-REST]],
         ]
@@ -398,7 +403,7 @@ def pairs_of_rows(first: Any, second: Any, same: bool) -> tuple[np.ndarray, np.n
 def _changed(shapes: np.ndarray, arm: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Accelerations of the centres of shapes (n, 3, ...) from those of their bodies."""
     turning = shapes[:, 15:18]
-    return np.asarray(motion[:, 0:3] + across(motion[:, 3:6], arm) + across(turning, across(turning, arm)))
+    return np.asarray(motion[:, 0:3] + row_cross(motion[:, 3:6], arm) + row_cross(turning, row_cross(turning, arm)))
 
 
 def _stacked(raw: Sequence[Any]) -> np.ndarray:

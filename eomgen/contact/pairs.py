@@ -46,7 +46,7 @@ class PairKind(Record):
         of what its turning moves (0 where it is round).
     witness : tuple of int
         Where they touch: :data:`~eomgen.contact.pair_sums.WITNESS` nodes for each place.
-    held : tuple of tuple of int
+    offsets : tuple of tuple of int
         Of each row of the first table and of each of the second a number: their sum is the place of the pair's states
         among all states of the sum.  Empty without states.
     states : int
@@ -81,7 +81,7 @@ class PairKind(Record):
     slopes: tuple[int, ...]
     touch: tuple[int, ...]
     witness: tuple[int, ...]
-    held: tuple[tuple[int, ...], ...] = ()
+    offsets: tuple[tuple[int, ...], ...] = ()
     states: int = 0
     calls: tuple[tuple[str, tuple[Function, tuple[int, ...]]], ...] = ()
     corners: tuple[int, ...] = ()
@@ -115,7 +115,7 @@ class PairKind(Record):
     @property
     def beside(self) -> tuple[int, tuple[tuple[int, ...], ...]] | tuple[()]:
         """How many states a pair has and where they stand; nothing without states."""
-        return (self.states, self.held) if self.states else ()
+        return (self.states, self.offsets) if self.states else ()
 
 
 # -- pair calls --------------------------------------------------------------------------------------------------------
@@ -187,13 +187,13 @@ class PairFunction:
         for kind in self.kinds if self.states else ():
             first, second = self.tables[kind.first], self.tables[kind.second]
             for i, j in zip(*pairs_of_rows(first, second, kind.first == kind.second), strict=True):
-                at = kind.held[0][i] + kind.held[1][j]
+                at = kind.offsets[0][i] + kind.offsets[1][j]
                 for k in range(at, at + kind.states):
                     result[k] |= {first[i][0], second[j][0]}
         return tuple(map(frozenset, result))
 
     @cached_property
-    def room(self) -> int:
+    def capacity(self) -> int:
         """How many pairs a list of near ones has room for: all, or some for each shape."""
         pairs = sum(
             len(self.tables[kind.first]) * len(self.tables[kind.second]) * (len(kind.witness) // WITNESS)
@@ -205,7 +205,7 @@ class PairFunction:
     @property
     def witnesses(self) -> int:
         """How many numbers such a list has."""
-        return 1 + RECORD * self.room
+        return 1 + RECORD * self.capacity
 
     @cached_property
     def touching(self) -> tuple[frozenset[int], ...]:
@@ -229,7 +229,7 @@ class PairFunction:
             )
             for k in self.kinds
         ]
-        return PairSum(self.bodies, self.tables, kinds, self.room, self.states)
+        return PairSum(self.bodies, self.tables, kinds, self.capacity, self.states)
 
     @staticmethod
     def _law(kind: PairKind, part: PairPart, made: Callable[[list[Expr], Sequence[str]], Callable[[Any], Any]]) -> Any:

@@ -231,7 +231,7 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
 
 
 _ENDS = "the plane (z points out of the solid) and the {0}"
-_CURVED: Fields = {"law": normal_key(CURVED_LAWS), "friction": FRICTION}
+_ROUND: Fields = {"law": normal_key(CURVED_LAWS), "friction": FRICTION}
 
 
 def _states(axes: str) -> Callable[[Mapping[str, Any]], dict[str, str]]:
@@ -253,7 +253,7 @@ TYPES = table(
         {
             "between": Pair(_ENDS.format("sphere's centre"), required=True),
             "radius": Scalar("radius of the sphere (m)", required=True, dimension=LENGTH, allowed=POSITIVE),
-            **_CURVED,
+            **_ROUND,
         },
         _on_plane,
         states=_states("xy"),
@@ -264,7 +264,7 @@ TYPES = table(
         {
             "between": Pair("the centres", required=True),
             "radii": Radii("radii of the spheres (m)", required=True, dimension=LENGTH),
-            **_CURVED,
+            **_ROUND,
         },
         _two_spheres,
         states=_states("xyz"),

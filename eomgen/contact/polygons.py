@@ -25,7 +25,7 @@ from ..expr import vectors as vec
 from ..expr.core import Expr, sqrt
 from ..expr.vectors import Vec3
 from .limits import FLAT_CORNER, NOWHERE
-from .pair_features import FACING, OWN
+from .pair_features import FACING, FIRST
 from .point import Contact, Touch
 from .profiles import Point, dot, minus, times, unit
 
@@ -51,7 +51,7 @@ class _Witness(NamedTuple):
 
     place: Point
     normal: Point
-    own: Expr  #: whether the corner is of the first polygon
+    of_first: Expr  #: whether the corner is of the first polygon
     depth: Expr
 
 
@@ -65,7 +65,7 @@ def _either(condition: Expr, yes: Point, no: Point) -> Point:
 
 def _witness_of(condition: Expr, a: _Witness, b: _Witness) -> _Witness:
     place, normal = _either(condition, a.place, b.place), _either(condition, a.normal, b.normal)
-    return _Witness(place, normal, where(condition, a.own, b.own), where(condition, a.depth, b.depth))
+    return _Witness(place, normal, where(condition, a.of_first, b.of_first), where(condition, a.depth, b.depth))
 
 
 class _Matter(NamedTuple):
@@ -211,7 +211,7 @@ class PolygonPolygon(Contact):
         b = _Edge(
             placed(other.edge.start), placed(other.edge.end), turned((nx, ny)), zy * nx - zx * ny, other.edge.bend
         )
-        flags = self.edges[FACING + 8 : OWN]
+        flags = self.edges[FACING + 8 : FIRST]
 
         def witness(
             flag: Expr, one: tuple[Point, Point], two: tuple[Point, Point], corners: tuple[Point, Point]

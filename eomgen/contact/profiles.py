@@ -16,7 +16,7 @@ from ..elements.frames import Frame
 from ..expr import vectors as vec
 from ..expr.core import Expr, cos, sin, sqrt
 from ..expr.vectors import Vec3
-from .limits import BELOW, EVEN, FLAT_CORNER, NOWHERE, ROOM, SHARED
+from .limits import BELOW, EVEN, FLAT_CORNER, INSIDE, NOWHERE, SHARED
 from .pair_features import PIECE
 from .point import Contact, Touch
 
@@ -438,7 +438,7 @@ def clearance_of_arcs(pieces: Sequence[ProfilePart]) -> float:
     way = place[:, None, :] - place[:, :, None]
     inward = 2.0 * (way * normal[:, :, None]).sum(axis=0)
     ahead = inward > 0.0
-    return ROOM * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
+    return INSIDE * float(((way * way).sum(axis=0)[ahead] / inward[ahead]).min(initial=math.inf))
 
 
 class InnerCornerRound(ProfilePiece):

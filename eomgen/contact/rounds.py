@@ -44,13 +44,13 @@ def along_axis(view: View, marker: Marker, k: int) -> Vec3:
     return vec.transpose(view.rotation(marker))[k]
 
 
-def settled(view: View, x: Expr) -> Expr:
+def converged(view: View, x: Expr) -> Expr:
     """A number to which iterations came, before the last of Newton's steps.
 
     At a solution the derivative of that step does not depend on where it began, so that the iterations before it need
     none: a view of pairs puts a symbol in the place of the number until derivatives are made.
     """
-    keep = getattr(view, "settled", None)
+    keep = getattr(view, "converged", None)
     return x if keep is None else keep(x)
 
 

@@ -381,12 +381,12 @@ def by_edges(
     Plates meet outlines only; where a group has some, outlines of the other stay what they are.
     """
 
-    def changed(own: Sequence[ContactShape], other: Sequence[ContactShape]) -> tuple[ContactShape, ...]:
+    def changed(these: Sequence[ContactShape], other: Sequence[ContactShape]) -> tuple[ContactShape, ...]:
         meets = any(shape.kind in ("box", "polygon") or shape.convex_corners() for shape in other)
         if not meets or any(shape.kind == "plate" or shape.is_wheel for shape in other):
-            return tuple(own)
+            return tuple(these)
         result = []
-        for shape in own:
+        for shape in these:
             corners = tuple(x for corner in shape.convex_corners() for x in corner)
             result.append(ContactShape("polygon", shape.marker, corners) if corners else shape)
         return tuple(result)

@@ -86,7 +86,7 @@ SOILS = {
 # ground.
 
 
-OWN = "own"  #: the soil whose numbers are all given
+CUSTOM = "own"  #: the soil whose numbers are all given
 REBOUND = 0.1  #: part of the sinkage that unloading gives back, where nothing is said
 REVERSAL = 0.01  #: (m/s) of a wheel over the ground, over which its front becomes its rear
 SETTLING = 1e-3  #: (s) of cells of a bed
@@ -374,7 +374,7 @@ def states_of_soil(axes: tuple[str, ...]) -> tuple[str, ...]:
 _ROW = ElementType("soil", "pressure and shear of soil, whose numbers are given or published.", _SOIL, read_soil)
 SOIL = Law(
     "soil under plates and wheels, instead of laws of normal force and friction: as type the name of a published one, "
-    f"whose numbers may be replaced by others, or {OWN} with all numbers given",
-    dict.fromkeys((OWN, *SOILS), _ROW),
+    f"whose numbers may be replaced by others, or {CUSTOM} with all numbers given",
+    dict.fromkeys((CUSTOM, *SOILS), _ROW),
     flat={"soil": "type"},
 )

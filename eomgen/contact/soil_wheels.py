@@ -81,9 +81,9 @@ class SoilWheel(Contact):
         scale, most = self._shared(view, self.width * self.radius), self.flat.deepest(view)
         if most is not None:
             scale = where(view.graph.apply("lt", most, motion.depth), sqrt(most - motion.depth), scale)
-        force_along, force_up, force_across, torque, tilt, yaw = (where(inside, scale * x, 0.0) for x in sums)
+        force_along, force_up, lateral_force, torque, tilt, yaw = (where(inside, scale * x, 0.0) for x in sums)
         force = vec.add(vec.add(vec.scale(force_along, along), vec.scale(force_up, normal)),
-                        vec.scale(force_across, sideways))  # fmt: skip
+                        vec.scale(lateral_force, sideways))  # fmt: skip
         arms = vec.add(vec.scale(tilt, along), vec.scale(yaw, normal))
         moment = vec.scale(self.radius, vec.sub(vec.scale(torque, sideways), arms))
         back = vec.neg(vec.add(moment, vec.cross(motion.reach, force)))

@@ -571,11 +571,11 @@ def symbols_of(outputs: Sequence[Expr]) -> set[str]:
 # -- copies ------------------------------------------------------------------------------------------------------------
 
 
-Held = TypeVar("Held")
+Copied = TypeVar("Copied")
 SHARED = frozenset({str, int, float, bool, type(None)})  #: types whose values are not copied
 
 
-def copied(value: Held) -> Held:
+def copied(value: Copied) -> Copied:
     """What ``copy.deepcopy`` gives of a tuple, list, dict, record or Expr, in a fraction of its time."""
     return _Copies().of(value)  # type: ignore[no-any-return]
 

@@ -185,7 +185,7 @@ class Notation:
         latex: Mapping[str, str] | None = None,
         instances: Mapping[str, str] | None = None,
     ) -> None:
-        self.given = {name: spaced(text) for name, text in (latex or {}).items()}
+        self.declared = {name: spaced(text) for name, text in (latex or {}).items()}
         self.instances = instances or {}
         self.names = tuple(dict.fromkeys(names))
         self._sources: dict[str, str] = {}
@@ -216,7 +216,7 @@ class Notation:
         if not latex:
             return self
         renamed = copy(self)
-        renamed.given = {**self.given, **latex}
+        renamed.declared = {**self.declared, **latex}
         renamed._sources = {**self._sources, **latex}
         renamed._used = self._used | {
             (form, _printed(form, x)) for x in latex.values() for form in ("latex", "text", "html")
@@ -274,13 +274,13 @@ class Notation:
 
     def _wanted(self, name: str) -> str:
         """The LaTeX of a name by itself; of a rate, from what it is the rate of."""
-        if name in self.given:
-            return self.given[name]
+        if name in self.declared:
+            return self.declared[name]
         stem, order = split_rate(name)
         if not order:
             return latex_of(self._with_dots(name))
-        if order == 2 and (rate := rate_of(stem)) in self.given:  # of a rate that is printed as a letter of its own
-            return dotted(self.given[rate], 1)
+        if order == 2 and (rate := rate_of(stem)) in self.declared:  # of a rate that is printed as a letter of its own
+            return dotted(self.declared[rate], 1)
         return dotted(self._source(stem), order) if order < len(DOTS) else literal(name)
 
     def _with_dots(self, name: str) -> str:
@@ -298,7 +298,7 @@ class Notation:
             for source in (wanted, literal(name), literal(name, "mathtt")):
                 forms = {(form, _printed(form, source)) for form in ("latex", "text", "html")}
                 text = _printed("text", source)
-                if name in self.given and text != name and text in known:
+                if name in self.declared and text != name and text in known:
                     self._texts[name] = name
                     forms.discard(("text", text))
                 if self._used.isdisjoint(forms):
@@ -307,7 +307,7 @@ class Notation:
             self._sources[name] = source
 
     def _rank(self, name: str) -> int:
-        if name in self.given:
+        if name in self.declared:
             return 0
         if split_rate(name)[1]:
             return 3

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base import algebra
-from ..base.limits.constraints import GIVEN as SMALL
+from ..base.limits.constraints import FURTHER_ROWS as SMALL
 from ..base.limits.numbers import ROUNDED
 from ..errors import ExpressionError, ModelError, Problem, ill_typed, incomplete
 from ..expr.core import Expr, Graph, substitute, symbols_of

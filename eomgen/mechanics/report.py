@@ -13,7 +13,7 @@ import numpy as np
 from ..base.assembly import close, closed, starts
 from ..base.files import as_path, save_figure
 from ..base.limits.constraints import MEASURED
-from ..base.limits.numbers import ACROSS
+from ..base.limits.numbers import TRANSVERSE
 from ..base.limits.positions import BESIDE, MOST_ANGLE, SLACK
 from ..base.operations import CHOICE, OPERATIONS
 from ..base.results import picture_html, side_by_side
@@ -93,7 +93,7 @@ def _sizes(functions: ConstraintFunctions, names: list[str]) -> tuple[Array, Arr
 
 
 POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
-SHOWN = 6
+LISTED_BODIES = 6
 
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
@@ -195,7 +195,7 @@ def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
     for k, body in bodies:
         spin = motion.turning_of(motion.body(k), own_axes=True, rate=False)
         tilts += vec.cross(spin, body.plane or spin)
-    zero = vanishes(tilts, ACROSS, pieces=True, unknown=True)
+    zero = vanishes(tilts, TRANSVERSE, pieces=True, unknown=True)
     return [body.name for k, (_, body) in enumerate(bodies) if not all(zero[3 * k : 3 * k + 3])]
 
 
@@ -212,8 +212,8 @@ def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:
-    listed = ", ".join(names[:SHOWN])
-    return listed if len(names) <= SHOWN else f"{listed}, ... ({len(names) - SHOWN} more)"
+    listed = ", ".join(names[:LISTED_BODIES])
+    return listed if len(names) <= LISTED_BODIES else f"{listed}, ... ({len(names) - LISTED_BODIES} more)"
 
 
 # -- report -----------------------------------------------------------------------------------------------------------
@@ -312,7 +312,7 @@ class MechanismReport(Record):
         """
         from ..show.graph import Graph
 
-        axes: Axes = Graph(self, ax, shown=file is None).ax
+        axes: Axes = Graph(self, ax, window=file is None).ax
         if file is not None:
             known = axes.figure.canvas.get_supported_filetypes()
             if as_path("file", file).suffix[1:].lower() not in known:

@@ -351,7 +351,7 @@ cdef class Kernel:
         return failed
 
     cdef object by_name(self, str label, object given, object bound):
-        """Values by name as an array, the others as bound, where who asked for the kernel knows names."""
+        """Values by name as an array, the others as bound, where who requested the kernel knows names."""
         if given is not None and not isinstance(given, np.ndarray) and hasattr(self.fail, "vector"):
             return self.fail.vector(label, given, bound)
         return given

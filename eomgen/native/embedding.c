@@ -446,7 +446,7 @@ int eom_kinematics(const eom_at *at, const double *x, double *out)
     }
     form_transformation(at, width);
     complete(at, x + coordinates, AT(RATE), v);
-    normalise(at, q);
+    normalize(at, q);
     copy(NX, out, AT(X));
     (void)evaluate_terms(at, AT(X), AT(TERMS));
     complete(at, x + coordinates + F, AT(TERMS) + N * (N + 1) / 2 + N + M * N, a);

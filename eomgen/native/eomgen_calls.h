@@ -8,7 +8,7 @@
 
 /* EOMGEN_CONTRACT: of a file whose operations may be contracted, which includes this first: the compiler forms fused
    operations, whatever its flags say of other files. EOMGEN_CONTRACTS: it does, where the processor has them; gcc forms
-   none without this optimisation. */
+   none without this optimization. */
 #if defined(EOMGEN_CONTRACT) && defined(__clang__)
 #pragma STDC FP_CONTRACT ON
 #pragma clang fp contract(fast)

@@ -95,7 +95,7 @@ static void spread(const eom_at *at, const double *restrict q, const double *res
 }
 
 /* Euler parameters of length 1. */
-static void normalise(const eom_at *at, double *restrict q)
+static void normalize(const eom_at *at, double *restrict q)
 {
     (void)at;
     for (int b = 0; b < QUATERNIONS && MODEL->rates == NULL; b++) {
@@ -140,12 +140,12 @@ static int is_within(const eom_at *at, double limit, double roundings, const dou
     return 1;
 }
 
-/* Newton has arrived, at rounding or within SETTLED and no longer getting closer; one step at least is always made,
+/* Newton has arrived, at rounding or within CONVERGED and no longer getting closer; one step at least is always made,
    because near configurations where rows depend on each other a small residual is not a small distance. */
 static int has_converged(const eom_at *at, int step, double size, double before, const double *restrict q)
 {
     return size == 0.0 || (step > 0 && (size <= CONSTRAINTS_EXACT
-        || (size > 0.5 * before && is_within(at, CONSTRAINTS_SETTLED, ROUNDING_ROUNDED, q))));
+        || (size > 0.5 * before && is_within(at, CONSTRAINTS_CONVERGED, ROUNDING_ROUNDED, q))));
 }
 
 /* The mean of |C / s_c|. */

@@ -160,7 +160,7 @@ static int find_point(const eom_at *at, double distance, double *restrict p)
         if (bring(at, p) != 0) {
             return 0;
         }
-        normalise(at, p);
+        normalize(at, p);
         for (int k = 0; k < NQ; k++) {
             away[k] = p[k] - q[k];
         }
@@ -280,7 +280,7 @@ static double interpolate_best(const eom_at *at, const double *restrict x, doubl
     for (int k = 0; k < MOVING; k++) {
         *speed = fmax(*speed, fabs(x[NQ + k] / AT(SCALES)[k]));
     }
-    normalise(at, state);
+    normalize(at, state);
     if (!(*speed > CROSSINGS_STILL)) {
         return 0.0;
     }
@@ -315,7 +315,7 @@ static int interpolate_rhs(const eom_at *at, const double *restrict x, double we
     }
     copy(NX, best, AT(X));
     copy(NX, best + NX, out);
-    normalise(at, AT(X));
+    normalize(at, AT(X));
     return 0;
 }
 
@@ -347,11 +347,11 @@ int eom_project(const eom_at *at, const double *x, double *out)
 {
     if (is_closed(at, x)) {
         copy(NX, x, out);
-        normalise(at, out);
+        normalize(at, out);
         return 0;
     }
     const int status = close_loops(at, x);
-    normalise(at, AT(X));
+    normalize(at, AT(X));
     if (status == 0 && MODEL->project_singular) {
         (void)interpolate_rhs(at, AT(X), nearness(at, AT(X)), 0, AT(RATED));
     }

@@ -267,13 +267,22 @@ def plain_name(name: object, instances: Mapping[str, str]) -> Any:
 
 def unknown(what: str, name: object, allowed: Iterable[str], place: str = "") -> UnknownNameError:
     """The error for an unknown name, with near misses or, if there are none, what there is."""
-    return UnknownNameError(f"{place}{': ' * bool(place)}no {what} {name!r}; {_hint(name, allowed)}")
+    return _unknown(what, [name], allowed, place)
+
+
+def _unknown(what: str, names: Iterable[object], allowed: Iterable[str], place: str) -> UnknownNameError:
+    """The error for unknown names: a line for each hint, so that what there is stands there once."""
+    hints: dict[str, list[str]] = {}
+    for name in names:
+        hints.setdefault(_hint(name, allowed), []).append(repr(name))
+    begin = f"{place}{': ' * bool(place)}no {what}"
+    return UnknownNameError("\n".join(f"{begin} {', '.join(same)}; {hint}" for hint, same in hints.items()))
 
 
 def find_lacking(one: object, kind: str, name: str) -> Any:
     """What ``__getattr__`` of a class has to say of an attribute that Python did not find.
 
-    Names that begin with an underscore are asked for by copy, pickle and notebooks, and are looked up nowhere.
+    Names that begin with an underscore are requested by copy, pickle and notebooks, and are looked up nowhere.
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
@@ -298,10 +307,9 @@ def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
 def check_names(
     what: str, raw: Iterable[object], allowed: Collection[str], further: Collection[str] = (), place: str = ""
 ) -> None:
-    """Raise :class:`UnknownNameError` for all names not allowed, a line each; `further` ones are suggested too."""
-    wrong = [unknown(what, name, [*allowed, *further], place) for name in dict.fromkeys(raw) if name not in allowed]
-    if wrong:
-        raise UnknownNameError("\n".join(map(str, wrong)))
+    """Raise :class:`UnknownNameError` for all names not allowed; `further` ones are suggested too."""
+    if wrong := [name for name in dict.fromkeys(raw) if name not in allowed]:
+        raise _unknown(what, wrong, [*allowed, *further], place)
 
 
 def read_names(what: str, raw: Any) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from ..base.limits.positions import MOST_ANGLE
 from ..base.texts import angle_in_degrees
 from ..errors import calls_within, ill_placed, ill_shaped, no_number
 from .argument_checks import both_names, read_number, read_numbers, require_mapping
-from .initial import Given, Initial
+from .initial import Initial, NamedValues
 from .kernels import Kernels, public_call, reduce
 from .layout import Layout
 from .refusals import require_support
@@ -258,7 +258,7 @@ class BoundModel:
             The values are not reached from the declared position without leaving its branch; the loops are then closed
             from the nearest guess; or an angle of more than two turns is given, as degrees would be.
         """
-        initial, raw = self._given(values, named, t, p, u)
+        initial, raw = self._initial_values(values, named, t, p, u)
         q = initial.assembled(raw.positions)
         v = initial.velocities(q, raw.rates if raw.positions or raw.rates else None)
         return np.concatenate([q, v])
@@ -296,7 +296,7 @@ class BoundModel:
         AssemblyError
             The loops do not close.
         """
-        initial, raw = self._given(guess, named, t, p, u)
+        initial, raw = self._initial_values(guess, named, t, p, u)
         if raw.rates:
             raise ill_placed(f"assemble takes positions only, not {', '.join(raw.rates)}; use x0 for rates")
         return initial.from_guess(raw.positions) if raw.positions else initial.assembled({})
@@ -319,7 +319,7 @@ class BoundModel:
         coordinates keep the values of the first position.  The search is bounded and repeats exactly; it may miss a
         branch.
         """
-        initial, raw = self._given(values, named, t, p, u)
+        initial, raw = self._initial_values(values, named, t, p, u)
         first = initial.assembled(raw.positions, rough=True)
         return initial.branches(raw.positions, first)
 
@@ -348,7 +348,7 @@ class BoundModel:
         there = initial.side(initial.reference())
         return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 
-    def _given(self, values: Any, named: Any, t: float, p: Any, u: Any) -> tuple[Initial, Given]:
+    def _initial_values(self, values: Any, named: Any, t: float, p: Any, u: Any) -> tuple[Initial, NamedValues]:
         """The assembly to these values, and the values as positions and rates."""
         if values is not None:
             require_mapping("initial values", values)
@@ -426,7 +426,7 @@ class BoundModel:
 
 
 def _called(name: str) -> Any:
-    """A call of a module as an attribute, made when it is first asked for."""
+    """A call of a module as an attribute, made when it is first requested."""
     made = cached_property[Any](lambda self: public_call(self.kernels, name))
     made.__set_name__(BoundModel, name)
     return made

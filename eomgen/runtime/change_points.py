@@ -144,14 +144,14 @@ class Looks:
         self.times = np.append(place * np.repeat(np.diff(t) / parts, parts) + np.repeat(t[:-1], parts), t[-1])
         values = singular_values(module, self.times, self.curve(self.times), self._inputs(self.times))
         self.least = values[:, self.rank - 1]
-        self.held = fixed
+        self.fixed = fixed
 
     def continues(self, before: Looks) -> bool:
         """Whether a reset at a change point, where the part before ended, lets the mechanism go on across it."""
         if max(before.least[-1], self.least[0]) > GONE:
             return False
         v, w = before.curve.x[self.n_q :, -1], self.curve.x[self.n_q :, 0]
-        return bool((v / self.module.layout.scales.q**2 * w)[self.held].sum() > 0.0)
+        return bool((v / self.module.layout.scales.q**2 * w)[self.fixed].sum() > 0.0)
 
     def at_start(self) -> ChangePoint:
         """The change point at which this part starts."""

@@ -87,7 +87,7 @@ class ProjectedStates(NamedTuple):
         return self.evaluate(self.module.kernels.inverse_dynamics, self.q, self.v, a)
 
     def shaped(self, result: Array, out: Array | None = None) -> Array:
-        """A result (..., k) as it was asked for."""
+        """A result (..., k) as it was requested."""
         return into(out, np.ascontiguousarray(result[..., 0] if self.single else result))
 
 

@@ -156,10 +156,10 @@ def best_architecture(capability: tuple[int, int]) -> str:
     """What to compile for a GPU of a compute capability: its machine code, or PTX where NVRTC is older than the GPU."""
     nvrtc = load_nvrtc()
     known = _done(nvrtc, nvrtc.nvrtcGetSupportedArchs())
-    own = 10 * capability[0] + capability[1]
-    if own in known:
-        return f"sm_{own}"
-    return f"compute_{max((number for number in known if number < own), default=min(known))}"
+    version = 10 * capability[0] + capability[1]
+    if version in known:
+        return f"sm_{version}"
+    return f"compute_{max((number for number in known if number < version), default=min(known))}"
 
 
 def load_nvrtc() -> Any:

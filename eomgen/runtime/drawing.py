@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # -- files that draw ---------------------------------------------------------------------------------------------------
 
 
-#: What is asked for by name; a generated package is without them.
+#: What is requested by name; a generated package is without them.
 PARTS = {
     "animate": "show.animate",
     "draw": "show.draw",
@@ -53,13 +53,13 @@ def load_show(part: str) -> ModuleType:
 # -- descriptions ------------------------------------------------------------------------------------------------------
 
 
-SHOWN = 12  #: names listed
+LISTED = 12  #: names listed
 
 
 def listed(names: Sequence[str]) -> str:
     """Names separated by commas, cut when there are many."""
-    text = ", ".join(names[:SHOWN])
-    return f"{text}, ... ({len(names)})" if len(names) > SHOWN else text or "-"
+    text = ", ".join(names[:LISTED])
+    return f"{text}, ... ({len(names)})" if len(names) > LISTED else text or "-"
 
 
 def facts(module: BoundModel) -> list[tuple[str, str]]:

@@ -26,13 +26,13 @@ from ..base.continuation import follow
 from ..base.limits.constraints import (
     ACCEPTED,
     BRANCH_STEP,
+    CONVERGED,
     COUPLED,
     GONE,
     INDEPENDENT,
     MEASURED,
     ONE_BRANCH,
     PASSED,
-    SETTLED,
     SHORT,
     STILL,
     UNMOVED,
@@ -280,7 +280,7 @@ class StartBranch:
 # the loops are closed from the nearest guess, and a warning says so.
 
 
-class Given(NamedTuple):
+class NamedValues(NamedTuple):
     """Values by the name of a coordinate, its rate, a loop coordinate or its rate."""
 
     positions: dict[str, float]
@@ -404,7 +404,7 @@ class Initial:
         joints = CutJoints(cut.names + names, cut.kinds + ("turn",) * len(names), scales, evaluate)
         self.system = self.system._replace(cut=joints)
 
-    def sort(self, values: Mapping[str, float]) -> Given:
+    def sort(self, values: Mapping[str, float]) -> NamedValues:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout, wanted = self.layout, self.wanted
         rates = layout.v + layout.loop_rates
@@ -423,7 +423,7 @@ class Initial:
                 raise UnknownNameError(f"{name!r} is an output, which cannot be given here; give coordinates or rates")
             raise unknown("coordinate or rate", name, self.coordinates + rates + layout.y)
         fast = {n: x for n, x in raw.items() if (wanted[n].of_velocities if n in wanted else n in rates)}
-        return Given(self.system.settle({n: x for n, x in raw.items() if n not in fast}), fast)
+        return NamedValues(self.system.settle({n: x for n, x in raw.items() if n not in fast}), fast)
 
     # functions of q
 
@@ -454,7 +454,7 @@ class Initial:
     def close_near(self, start: Array, fixed: Mapping[str, float], restarts: int = RESTARTS) -> Array:
         """The closed position near a start, also where Newton's steps halve the distance only, as at a change point."""
         result = self.system.close(start, fixed, restarts)
-        if result.residual > SETTLED:
+        if result.residual > CONVERGED:
             return where_lost(self.system.closure(fixed), result.q)
         return result.q
 
@@ -470,7 +470,7 @@ class Initial:
 
     def moved_reference(self, raw: Iterable[str], rough: bool) -> Array | None:
         """Where drivers by this time, or bound parameters, bring the reference position; None without, or blocked."""
-        if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= SETTLED:
+        if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= CONVERGED:
             return None if self.layout.rebound is None else self._at_parameters(raw, rough)
         first = Initial(self.kernels).reference(raw, rough)
         try:

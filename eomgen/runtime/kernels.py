@@ -94,7 +94,7 @@ class Kernels:
 
     ``kernels.poses`` is the kernel of this name.  Here all are as in C: velocities are [v; s], with first-order states
     among them, and rows those of all constraints; :func:`public_call` gives what users see.  They are made anew when
-    asked for: what is kept lives as long as Fail, which refers back.
+    requested: what is kept lives as long as Fail, which refers back.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class Kernels:
             n = layout.inputs(name)
             return self.derived(name, kind, lambda *x, **_: np.zeros((*result, *batch_of(x, n))), choose)
         if not layout.n_c and name == "project":
-            return self.derived(name, kind, self._normalised)
+            return self.derived(name, kind, self._normalized)
         if not layout.rank and name == "embedded_mass_matrix":
             every = _places((layout.n_v, layout.n_v))[np.ix_(layout.independent, layout.independent)]
             return self.kernel("mass_matrix", nan, kind, every if pick is None else every.ravel()[pick])
@@ -200,7 +200,7 @@ class Kernels:
             self.kernel(name)(t, x, u=u)  # tells what is wrong
         return result
 
-    def _normalised(self, x: Any, **raw: Any) -> Array:
+    def _normalized(self, x: Any, **raw: Any) -> Array:
         """The projection of a tree: nothing to do but for the length of Euler parameters."""
         result = np.array(read_numbers("x", x))
         batch_of((result,), self.layout.n_x)
@@ -395,10 +395,10 @@ def _not_finite(kernels: Any, t: float, x: Array, p: Array | None, u: Array | No
 # -- exceptions --------------------------------------------------------------------------------------------------------
 
 
-Own = Array | None  #: p or u of a call; None for those that are bound
-SHOWN = 8  #: coordinates listed in a message
+Bound = Array | None  #: p or u of a call; None for those that are bound
+LISTED = 8  #: coordinates listed in a message
 
-WORDS = {
+CAUSES = {
     1: (
         "the result is not finite",
         "look for an input that is not a number, a division by zero, or a root or logarithm of a negative number",
@@ -437,16 +437,18 @@ class Fail:
         what, names = ("parameter", self.layout.p) if label == "p" else ("input", self.layout.u)
         return self.layout.values(what, names, raw, bound) if isinstance(raw, Mapping) else raw
 
-    def trouble(self, x: Array, t: float = 0.0, p: Own = None) -> tuple[str, str] | None:
+    def trouble(self, x: Array, t: float = 0.0, p: Bound = None) -> tuple[str, str] | None:
         """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""
         return flat_disc(self.kernels, x, t, p) or rotation_trouble(self.layout, x)
 
-    def __call__(self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None) -> None:
+    def __call__(self, name: str, status: int, t: float, x: Array, p: Bound = None, u: Bound = None) -> None:
         raise self.exception(name, status, t, x, p, u)
 
-    def exception(self, name: str, status: int, t: float, x: Array, p: Own = None, u: Own = None) -> EvaluationError:
+    def exception(
+        self, name: str, status: int, t: float, x: Array, p: Bound = None, u: Bound = None
+    ) -> EvaluationError:
         """The exception, not raised."""
-        what, remedy = WORDS.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
+        what, remedy = CAUSES.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
         names = self._names(name)
         at, blame = place(names, x), ""
         if not np.isfinite(x).all() and names:
@@ -462,7 +464,7 @@ class Fail:
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t, p)):
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
-            blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
+            blame, remedy = f": squares of {', '.join(large[:LISTED])} overflow", "check the state given"
         elif name == "resets" and (switches := self.layout.switches):
             closed = ", ".join(one for one, state in switches.items() if x[self.layout.x.index(state)] > 0.5)
             blame = (
@@ -474,7 +476,7 @@ class Fail:
             remedy = "start a little away from this position, or change the dimensions"
         elif names or not self.layout.n_x:
             if status == 5 and (result := self._diagnose(1, t, x, p, u)):
-                status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
+                status, (what, remedy) = 1, CAUSES[1]  # a solver cannot tell a law that is no number from rounding
             else:
                 result = self._diagnose(status, t, x, p, u)
             blame = f": {result}" if result else ""
@@ -483,7 +485,7 @@ class Fail:
         error = STATUS.get(status, EvaluationError)
         return error(f"{name} at t = {t:.6g}{at}: {what}{blame}; {remedy}", t, x)
 
-    def _diagnose(self, status: int, t: float, x: Array, p: Own, u: Own) -> str:
+    def _diagnose(self, status: int, t: float, x: Array, p: Bound, u: Bound) -> str:
         try:
             return diagnose(self.kernels, status, t, x, p, u)
         except UsageError:  # a kernel that would tell was not generated
@@ -532,8 +534,8 @@ def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
 
 def place(names: Sequence[str], x: Array) -> str:
     """``, theta = 0.3, s = 0.4``: the first coordinates of a state."""
-    listed = [f"{name} = {value:.6g}" for name, value in zip(names, x, strict=False)][:SHOWN]
-    return "".join(f", {item}" for item in listed) + (", ..." if len(names) > SHOWN else "")
+    listed = [f"{name} = {value:.6g}" for name, value in zip(names, x, strict=False)][:LISTED]
+    return "".join(f", {item}" for item in listed) + (", ..." if len(names) > LISTED else "")
 
 
 # -- constraints -------------------------------------------------------------------------------------------------------

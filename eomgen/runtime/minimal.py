@@ -38,7 +38,7 @@ from .refusals import require_support, require_switched
 
 # -- the motion of the whole tree --------------------------------------------------------------------------------------
 
-STEP = 0.1  #: largest scaled change of an independent coordinate that one Newton iteration is asked for
+STEP = 0.1  #: largest scaled change of an independent coordinate that one Newton iteration may make
 EARLY = 1000  #: steps after which a way is refused that is too long at the present rate of the dependent coordinates
 JUMP = 0.6  #: largest scaled change of any coordinate in one iteration; more may be another branch
 

@@ -174,7 +174,7 @@ class Curves(NamedTuple):
     points: Sequence[tuple[float, float]] = ()
     logarithmic: bool = False
     equal: bool = False  #: one scale for both axes
-    across: str = ""  #: label of a horizontal axis of its own
+    x_label: str = ""  #: label of a horizontal axis of its own
 
 
 def plot(
@@ -196,7 +196,7 @@ def choose(
     y: str | Sequence[str] | None,
     kind: str,
 ) -> tuple[list[Curves], str]:
-    """Panels of what is asked for, and the label of their horizontal axis."""
+    """Panels of what is requested, and the label of their horizontal axis."""
     known = ("t", *trajectory.names)
     requested = [one for name in raw for one in read_names("a column", name)]  # a list of names is taken too
     instances = trajectory.metadata.get("instances", {})
@@ -255,12 +255,12 @@ def stack(figure: Any, grid: Any, panels: Sequence[Curves], abscissa: str) -> li
         cells = grid.subgridspec(len(panels), 1, height_ratios=heights)
     axes: list[Any] = []
     for k, panel in enumerate(panels):
-        labelled = panel.across or k == 0
+        labelled = panel.x_label or k == 0
         ax = figure.add_subplot(cells[k], sharex=None if labelled else axes[0])
         draw_panel(ax, panel)
         axes.append(ax)
-        if panel.across or k + 1 == len(panels):
-            ax.set_xlabel(panel.across or abscissa)
+        if panel.x_label or k + 1 == len(panels):
+            ax.set_xlabel(panel.x_label or abscissa)
         else:
             ax.tick_params(labelbottom=False)
     figure.align_ylabels(axes)
@@ -359,8 +359,8 @@ def _phases(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[lis
         starts = [(float(x[0]), float(y[0])) for _, x, y in curves]
         rate = label(printed(rates[0]) if len(group) == 1 else "rate", trajectory.units.get(rates[0], ""))
         abscissa = label(printed(group[0]) if len(group) == 1 else "coordinate", trajectory.units.get(group[0], ""))
-        panels.append(Curves(rate, curves, starts, across=abscissa))
-    return panels, panels[0].across if panels else ""
+        panels.append(Curves(rate, curves, starts, x_label=abscissa))
+    return panels, panels[0].x_label if panels else ""
 
 
 def _energy(trajectory: Any, names: tuple[str, ...], x: str | None) -> tuple[list[Curves], str]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..base.algebra import Array
 
 #: Parameters or inputs of a call: an array of all, or values by name, where the others are as bound.
-Given: TypeAlias = ArrayLike | Mapping[str, Any] | None
+Values: TypeAlias = ArrayLike | Mapping[str, Any] | None
 
 
 class Call(Protocol):
@@ -24,15 +24,15 @@ class Call(Protocol):
 class Bound(TypedDict, total=False):
     """The other names of ``p`` and ``u``."""
 
-    parameters: Given
-    inputs: Given
+    parameters: Values
+    inputs: Values
 
 
 class Timed(Protocol):
     """A kernel of time and state; ``jacobian`` by the state, ``wrt="u"`` or ``wrt="p"``."""
 
     def __call__(
-        self, t: ArrayLike, x: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None,
+        self, t: ArrayLike, x: ArrayLike, p: Values = None, u: Values = None, out: Array | None = None,
         wrt: str | None = None, **raw: Unpack[Bound],
     ) -> Array: ...  # fmt: skip
 
@@ -41,7 +41,7 @@ class State(Protocol):
     """A kernel of the state, or of the coordinates, alone."""
 
     def __call__(
-        self, x: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None, t: ArrayLike = 0.0,
+        self, x: ArrayLike, p: Values = None, u: Values = None, out: Array | None = None, t: ArrayLike = 0.0,
         **raw: Unpack[Bound],
     ) -> Array: ...  # fmt: skip
 
@@ -50,7 +50,7 @@ class Projection(Protocol):
     """The projection, whose second argument is the time: the constraints of drivers move with it."""
 
     def __call__(
-        self, x: ArrayLike, t: ArrayLike = 0.0, p: Given = None, u: Given = None, out: Array | None = None,
+        self, x: ArrayLike, t: ArrayLike = 0.0, p: Values = None, u: Values = None, out: Array | None = None,
         **raw: Unpack[Bound],
     ) -> Array: ...  # fmt: skip
 
@@ -59,7 +59,7 @@ class Rows(Protocol):
     """Constraints, their Jacobian or rates: of the independent rows, or of all with ``rows="all"``."""
 
     def __call__(
-        self, q: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None, t: ArrayLike = 0.0,
+        self, q: ArrayLike, p: Values = None, u: Values = None, out: Array | None = None, t: ArrayLike = 0.0,
         rows: str = "independent", **raw: Unpack[Bound],
     ) -> Array: ...  # fmt: skip
 
@@ -68,7 +68,7 @@ class Motion(Protocol):
     """A kernel of coordinates, velocities and accelerations."""
 
     def __call__(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, p: Given = None, u: Given = None, out: Array | None = None,
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, p: Values = None, u: Values = None, out: Array | None = None,
         t: ArrayLike = 0.0, **raw: Unpack[Bound],
     ) -> Array: ...  # fmt: skip
 

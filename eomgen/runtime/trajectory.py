@@ -123,12 +123,12 @@ class Residuals(NamedTuple):
 # -- columns -----------------------------------------------------------------------------------------------------------
 
 
-FEW = 10_000  #: numbers at most of the raw states that are kept with a run, until its residuals are asked for
+FEW = 10_000  #: numbers at most of the raw states that are kept with a run, until its residuals are requested
 NO_RESIDUALS = Residuals()
 
 
 class Columns:
-    """Everything that can be read from the states of a run, evaluated when first asked for.
+    """Everything that can be read from the states of a run, evaluated when first requested.
 
     The module has parameters and constant inputs bound; x (n_x, n_t) is projected, and u (n_u, n_t) may be a function
     that gives it when it is first needed.  ``steps()`` gives t, x and u of the integrator's steps, where other times
@@ -297,7 +297,7 @@ def project(
 ) -> tuple[Residuals | Callable[[], Residuals], Array]:
     """Projected states (n_x, k), and how far the raw ones were off, with the inputs of the run as they are then.
 
-    Of a short run the residuals are a function, which evaluates them when they are first asked for.
+    Of a short run the residuals are a function, which evaluates them when they are first requested.
     """
     if not t.size or not (module.n_rows or module.layout.space):
         return NO_RESIDUALS, raw
@@ -367,7 +367,7 @@ class Trajectory:
     ``traj["theta"]`` is a column (n_t,): coordinates, velocities (``theta_dot``), accelerations (``theta_ddot``),
     coordinates of cut joints (angles without jumps) and their rates, outputs, inputs, ``T``, ``V`` and ``energy`` (the
     model's own quantities of these names come first; see ``energies``).
-    SI units and radians.  What was not integrated is evaluated when first asked for.
+    SI units and radians.  What was not integrated is evaluated when first requested.
 
     Attributes
     ----------

@@ -545,12 +545,14 @@ class Axes3DPicture:
         elevation, azimuth = view or default_view(scene)
         ax.view_init(elevation, azimuth, vertical_axis="xyz"[vertical])  # first: the shape of the box is set for it
         ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
-        ax.set_box_aspect(np.abs(np.diff(limits)[:, 0]), zoom=ZOOM)
+        lengths = np.abs(np.diff(limits)[:, 0])
+        ax.set_box_aspect(lengths, zoom=ZOOM)
         ax.set_xlabel("x (m)", fontsize=8)
         ax.set_ylabel("y (m)", fontsize=8)
         ax.set_zlabel("z (m)", fontsize=8)
         ax.tick_params(labelsize=7)
-        ax.locator_params(nbins=5)
+        for axis, length in zip((ax.xaxis, ax.yaxis, ax.zaxis), lengths, strict=True):  # as dense on short axes
+            axis.get_major_locator().set_params(nbins=max(2, round(5 * length / lengths.max())))
         self.labels = self._names()
 
     def _names(self) -> list[Any]:

@@ -17,7 +17,7 @@ from .symbols import element_items, joint_items, wall_items
 
 MARGIN = 0.06  #: of the extent, around the picture
 LEAST = 0.4  #: shortest edge over the longest
-MANY = 14  #: names more than which are left out unless asked for
+MANY = 14  #: names more than which are left out unless requested
 
 
 def build_scene(
@@ -50,7 +50,7 @@ def build_scene(
     trace : sequence of str
         Markers (``rod.tip``) or bodies, whose ways over the frames are drawn.
     quiet : bool
-        Without warnings about meshes that cannot be drawn, where nobody asked for a picture.
+        Without warnings about meshes that cannot be drawn, where nobody requested a picture.
     like : Scene, optional
         With the view and the size of symbols of another scene.
     """

@@ -45,7 +45,7 @@ class MotionFrames(NamedTuple):
         What is written above each frame: its time, or the coordinate that is led.
     over : (k,) array
         Time, or the coordinate that is led where time stands still.
-    across : str
+    x_label : str
         How the latter is printed at an axis.
     """
 
@@ -56,7 +56,7 @@ class MotionFrames(NamedTuple):
     fps: float
     captions: list[str]
     over: Array
-    across: str = TIME
+    x_label: str = TIME
 
     @property
     def pace(self) -> str:
@@ -153,7 +153,7 @@ def draw_curves(axes: Sequence[Any], panels: Sequence[Sequence[FrameColumn]], mo
         if len(axes) > 1:
             ax.set_ylabel(label("", panel[0].unit), fontsize=8)
             ax.sharex(axes[0])
-    axes[-1].set_xlabel(motion.across, fontsize=8)
+    axes[-1].set_xlabel(motion.x_label, fontsize=8)
 
 
 # -- pictures ----------------------------------------------------------------------------------------------------------

@@ -59,11 +59,11 @@ class Graph:
     Joints of the tree are straight, those that close loops bent away from what is drawn, elements are diamonds.
     """
 
-    def __init__(self, report: Any, ax: Any = None, shown: bool = False) -> None:
+    def __init__(self, report: Any, ax: Any = None, window: bool = False) -> None:
         self.report = report
         self.bodies, columns, layers = layout(report)
         if ax is None:
-            make = matplotlib("pyplot", "the picture").figure if shown else matplotlib("figure", "the picture").Figure
+            make = matplotlib("pyplot", "the picture").figure if window else matplotlib("figure", "the picture").Figure
             size = min(1.0 + COLUMN * max(columns, 3), 40.0), min(1.3 + LAYER * (layers + 1), 40.0)
             ax = make(figsize=size, layout="constrained").add_subplot()
         self.ax = ax

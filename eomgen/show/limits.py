@@ -2,8 +2,6 @@
 
 #: Relative distance of points, directions and moments that count as one: rounding of poses, far below a line's width.
 SAME = 1e-9
-#: Relative difference of a coordinate from what a slider asks for that counts as none: far below a step of it.
-HELD = 1e-6
 #: Relative step of coordinates for the displacements of points in a mode: about the cube root of rounding.
 STEP = 1e-5
 #: Relative difference of a coordinate between two branches that is printed in three digits.

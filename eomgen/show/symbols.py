@@ -166,7 +166,7 @@ class Stretched:
         (turn, a), (_, b) = placed(poses, self.start), placed(poses, self.end)
         way = b - a
         length = float(np.linalg.norm(way))
-        side, other = _across(way / length if length > 0.0 else turn[:, 2], self.view)
+        side, other = _normals(way / length if length > 0.0 else turn[:, 2], self.view)
         points: Array = a + self.shape @ np.array([way, side, other])
         return points
 
@@ -378,7 +378,7 @@ def _lines(
         points = move_frame(frames[0], _broken(lines))
         return [Item("force", name, frames[0].body, points)]
     if element.get("walls"):
-        lateral, _ = _across(np.array([0.0, 0.0, 1.0]), None if view is None else view @ placed(poses, frames[0])[0])
+        lateral, _ = _normals(np.array([0.0, 0.0, 1.0]), None if view is None else view @ placed(poses, frames[0])[0])
         near = [z for z in element["walls"] if abs(z) <= FAR * symbol] or [0.0]
         lines = [np.array([[0.0, 0.0, z] + side * WALL * symbol * lateral for side in (1.0, -1.0)]) for z in near]
         return [Item("force", name, frames[0].body, move_frame(frames[0], _broken(lines)))]
@@ -405,7 +405,7 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
 
     rotation, place = placed(poses, marker)
     along = (rotation @ way if element["own"] else way) / size
-    side, other = _across(along, view)
+    side, other = _normals(along, view)
     if element["turns"]:  # counterclockwise, seen against the axis
         points = symbol * (shape[:, :1] * other + shape[:, 1:2] * np.cross(along, other))
     else:
@@ -415,7 +415,7 @@ def _pull(element: dict[str, Any], view: Array | None, symbol: float, poses: Arr
     return [Item("pull", element["name"], GROUND, place + points, None, Shifted(marker, points))]
 
 
-def _across(along: Array, view: Array | None) -> tuple[Array, Array]:
+def _normals(along: Array, view: Array | None) -> tuple[Array, Array]:
     """Two unit vectors across a direction, the first on the page."""
     other = np.eye(3)[int(np.argmin(np.abs(along)))] if view is None else view[2]
     side = np.cross(other, along)

@@ -329,7 +329,7 @@ def describe_native(compiler: CompilerInfo, flags: tuple[str, ...]) -> str:
 
 # -- options and flags -------------------------------------------------------------------------------------------------
 
-#: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorises straight-line code
+#: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorizes straight-line code
 #: to its harm: Panda, UR5, Talos, ANYmal take 0.97, 0.96, 0.96, 0.91 of the time, linkages with loops 0.97 to 1, and
 #: the compiler 0.6 of its time; -O3 is no faster than -O2 (``python -m benchmarks.run rhs``).
 GCC_LEVEL = 1

@@ -24,7 +24,7 @@ from .trusted_files import digest, locked
 NAME = "_native"
 PACKAGE = Path(__file__).parents[1]
 #: C files of which x86-64 has another text for wide vectors, taken from six states on. Compiled as models are, runs of
-#: fewer states take 0.85 of the time that vectorised loops take (gcc 12, pendulum).
+#: fewer states take 0.85 of the time that vectorized loops take (gcc 12, pendulum).
 PLAIN = ("eomgen_steppers.c", "eomgen_contacts.c")
 PATIENCE = 300.0  #: seconds to wait for another process that builds it
 _lock = Lock()

@@ -97,10 +97,10 @@ def _joints(model: CheckedModel) -> Finding:
             parts = [*position, *(x for row in rotation for x in row)]
             flat = truth.system.evaluate(f"pose {spec.name}", partial(list, parts), values)
             back = outer.rotation.T
-            own = np.concatenate([back @ (inner.position - outer.position), (back @ inner.rotation).ravel()])
+            relative = np.concatenate([back @ (inner.position - outer.position), (back @ inner.rotation).ravel()])
             for expected in (flat, _textbook(spec, truth)):
                 if expected is not None:
-                    gaps += [*numbers(own - expected)]
+                    gaps += [*numbers(relative - expected)]
                     labels += [f"{spec.name} {what}" for what in PARTS]
         C = model.module.kernels.constraint_jacobian(truth.case.q, **truth.case.timed)
         moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0

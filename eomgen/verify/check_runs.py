@@ -50,7 +50,7 @@ def check_runs(model: CheckedModel) -> list[Finding]:
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
     kinked = not model.layout.info.smooth
-    references = [(case, cache(_reference(model, case))) for case in _held(model)[:TRIED]]
+    references = [(case, cache(_reference(model, case))) for case in _run_states(model)[:TRIED]]
     result = [_order(model, method, references) for method in ORDERS if method in _methods(model)]
     end = _far(model, *references[0])
     result += [_agreement(model, *end), _energy(model, end[0])]
@@ -78,7 +78,7 @@ def _methods(model: CheckedModel) -> tuple[str, ...]:
     return (*eager(model.module.core).methods, "RK4")
 
 
-def _held(model: CheckedModel) -> list[SystemState]:
+def _run_states(model: CheckedModel) -> list[SystemState]:
     """The states as runs with held inputs have them: rates of inputs are 0, and the state is on the constraints."""
     rates = [model.layout.u.index(rate) for of in model.layout.input_rates.values() for rate, _ in of]
     if not rates:
@@ -218,7 +218,7 @@ def _as_scipy(bound: BoundModel, case: SystemState, method: str, h: float, end: 
 
 def _agreement(model: CheckedModel, h: float, expected: Array) -> Finding:
     """DOP853, RK45 and Radau at tight tolerances end where SciPy's DOP853 does."""
-    check, case = "runs: methods agree", _held(model)[0]
+    check, case = "runs: methods agree", _run_states(model)[0]
     methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(model)] or ["DOP853"]
     bound = model.module.bind(case.p, case.u)
     result = Comparison(check, ", ".join(methods))
@@ -235,7 +235,7 @@ def _agreement(model: CheckedModel, h: float, expected: Array) -> Finding:
 
 def _energy(model: CheckedModel, h: float) -> Finding:
     """Loops stay closed over a run; where nothing but potentials acts, the energy stays what it was."""
-    module, case = model.module, _held(model)[0]
+    module, case = model.module, _run_states(model)[0]
     result = Comparison("runs: energy and loops")
     bound = module.bind(case.p, case.u)
     rtol, atol = COMPARED, ABSOLUTE * COMPARED

@@ -61,7 +61,7 @@ class PreciseSystem:
 
 
 class Truth:
-    """One state of a model, and the ways that lead through it; every quantity is found when it is first asked for."""
+    """One state of a model, and the ways that lead through it; every quantity is found when it is first requested."""
 
     def __init__(self, system: PreciseSystem, case: SystemState) -> None:
         self.system, self.case, self.mp = system, case, system.mp

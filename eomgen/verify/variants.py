@@ -112,26 +112,26 @@ def _made(mechanism: Mechanism, method: str) -> BoundModel:
     return BoundModel(pipeline.compile_core(derived, "numpy", ["rhs"]))
 
 
-def _own(model: CheckedModel) -> Mechanism:
+def _copy(model: CheckedModel) -> Mechanism:
     return copied(model.mechanism)
 
 
 def _derived(model: CheckedModel, method: str) -> BoundModel:
     if model.mechanism.bare:
         raise NotApplicable("the equations are given")
-    return _made(_own(model), method)
+    return _made(_copy(model), method)
 
 
 def _interpreted(model: CheckedModel, target: str) -> BoundModel:
     if target == "numpy":
         raise NotApplicable("the module is of target numpy itself; verify one of target cython")
-    return _made(_own(model), model.equations.method)
+    return _made(_copy(model), model.equations.method)
 
 
 # -- frames of bodies --------------------------------------------------------------------------------------------------
 def _turned(model: CheckedModel, seed: int) -> BoundModel:
     """Every body's frame turned by any angle about any axis, and shifted."""
-    mechanism, random = _own(model), np.random.default_rng(seed)
+    mechanism, random = _copy(model), np.random.default_rng(seed)
     if not mechanism.bodies:
         raise NotApplicable("there are no bodies")
     graph, size = mechanism.graph, SHIFT * float(model.module.info.length_scale or 1.0)
@@ -201,7 +201,7 @@ class _Moved:
 # -- cuts --------------------------------------------------------------------------------------------------------------
 def _cut_another(model: CheckedModel, seed: int) -> BoundModel:
     """Of a loop another joint is cut: the only one of it whose coordinates the user did not name."""
-    mechanism, topology = _own(model), model.kinematics.topology
+    mechanism, topology = _copy(model), model.kinematics.topology
     joints = mechanism.joints
     able = [k for cut in topology.cut for k in _way_round(mechanism, topology, cut) if joints[k].joint.role == "either"]
     for chosen in np.random.default_rng(seed).permutation(able).astype(int).tolist():

@@ -1,7 +1,7 @@
 /* Calls every function of one exported C library as its headers allow; test_c_code.py writes the numbers.
 
    Every array has exactly the length the headers ask for, so that a sanitizer sees each access beyond; the work array is
-   not initialised. What must not depend on something is computed twice and compared bit by bit: the rubbish in the work
+   not initialized. What must not depend on something is computed twice and compared bit by bit: the rubbish in the work
    array, the alignment of arrays (8 bytes suffice outside lanes), lanes, and 8 threads at once. */
 #define _POSIX_C_SOURCE 200112L
 #include <math.h>
@@ -70,7 +70,7 @@ static void try_plain(int k)
     const size_t n = (size_t)kernel->n_out, n_in = (size_t)kernel->n_in, n_work = (size_t)model->n_work;
     for (int j = 0; j < STATES; j++) {
         const double *const x = given[k] + (size_t)j * n_in;
-        double *const out = room(n, 1), *const w = room(n_work, 1); /* uninitialised */
+        double *const out = room(n, 1), *const w = room(n_work, 1); /* uninitialized */
         double *const odd_x = room(n_in + 1, 1), *const odd = room(n + 1, 1), *const dirty = room(n_work + 1, 1);
         if (call(k, j, NULL, w) != 0) {
             complain("fails where no result is wanted", kernel->name, j);

@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -82,12 +83,12 @@ def test_every_example_is_recorded() -> None:
 def test_benchmarks_keep_their_limits(options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "results.md"
     assert main([*options, "--out", str(page)]) == 0
-    assert "MISSED" not in capsys.readouterr().out
-    for name in options:
-        if name != "--quick":
-            _, _, part = page.read_text().partition(f"\n## {name}: ")
-            met, every = re.search(r"^- (\d+) of (\d+) limits met\.$", part, re.MULTILINE).groups()
-            assert met == every != "0"
+    out = capsys.readouterr().out
+    assert "MISSED" not in out
+    parts = re.split(r"─ (\w+): ", out)
+    assert all("  met: " in part for part in parts[2::2])
+    assert {*parts[1::2]} == {*options} - {"--quick"}
+    assert all(f"| {name} | " in page.read_text() for name in parts[1::2])
 
 
 def test_unknown_benchmark_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,12 +113,16 @@ def test_a_part_of_the_page_of_results_takes_the_place_of_the_last_one(tmp_path:
     page, names = tmp_path / "results.md", list(BENCHMARKS)[:2]
     for name, value in ((names[0], 1.0), (names[1], 2.0), (names[0], 3.0)):
         report = Report()
-        report.table("speed", ("who", "s"), [["ours", value]])
+        report.result("run, s", value, {"SymPy": 4 * value, "absent": None})
         report.most("seconds", value, 2.5)
-        write(page, name, report, "a machine")
-    text = page.read_text()
-    assert [line.split(":")[0] for line in text.splitlines() if line.startswith("## ")] == [f"## {n}" for n in names]
-    assert "| ours | 1 |" not in text
-    assert "| ours | 3 |" in text
-    assert "- 0 of 1 limits met.\n- **MISSED: seconds 3 (at most 2.5)**" in text
-    assert text.count("a machine*") == 2
+        write(page, name, report, "a machine, Python 3")
+    _, rows, machines = page.read_text().split("\n\n")
+    measured = f"{date.today()} A |"
+    assert rows.splitlines()[2:] == [
+        f"| {names[0]} | run, s | 3 | SymPy 12 (4) | {measured}",
+        f"| {names[0]} | 0 of 1 limits met | | missed: seconds 3 (at most 2.5) | {measured}",
+        f"| {names[1]} | run, s | 2 | SymPy 8 (4) | {measured}",
+    ]
+    assert machines == "- A: a machine, Python 3\n"
+    write(page, names[0], report, "another machine, Python 3")
+    assert page.read_text().count(f"| run, s | 3 | SymPy 12 (4) | {date.today()} ") == 2

@@ -58,7 +58,7 @@ NAMES = [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *LOOPS, "powered_arm", *RE
 def test_jacobian_of_models(module: Callable[..., Any], name: str, method: str) -> None:
     mod = module(name, method)
     for x in judges.random_states(mod, 31, 3):
-        # off the manifold the regularisation of redundant rows follows the residual: a kink that is of second order
+        # off the manifold the regularization of redundant rows follows the residual: a kink that is of second order
         compare(mod, x, 0.3, h=1e-6 if name == "bricard" else 1e-5)
 
 

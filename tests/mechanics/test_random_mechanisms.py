@@ -190,7 +190,7 @@ class Balance:
             self.along(k, -elastic * max(STOP["dissipation"] * self.motion.v[k], -1.0))
 
     def contact(self) -> None:
-        """Hunt and Crossley's force and regularised Coulomb friction in the middle of the overlap."""
+        """Hunt and Crossley's force and regularized Coulomb friction in the middle of the overlap."""
         plane, ball = self.made.floor, self.recipe.last
         R = (self.motion.R[plane] if plane >= 0 else np.eye(3)) @ FLOOR
         normal, centre = R[:, 2], self.point(ball, TIP)[0]

@@ -467,6 +467,20 @@ def test_names_on_the_command_line(words: list[str], meant: str) -> None:
     assert f"id you mean {meant}" in done.err.replace("'", "")
 
 
+def test_a_file_is_suggested_where_its_name_without_suffix_is_alike(tmp_path: Path) -> None:
+    (tmp_path / "cam.yaml").touch()
+    assert "did you mean" not in command.run("check", tmp_path / "scissor.yaml").err
+    assert f"did you mean {tmp_path / 'cam.yaml'}?" in command.run("check", tmp_path / "cma.yaml").err
+
+
+def test_what_there_is_stands_once_for_all_names_that_are_like_none(held: dict[str, Any]) -> None:
+    with refused("EG-NAME-UNKNOWN 'zzz' 'G' '?'") as caught:
+        held["Module"].simulate((0, 1), parameters={"zzz": 1.0, "G": 2.0, "?": 3.0})
+    first, second = str(caught.value).splitlines()
+    assert first.startswith("no parameter 'zzz', '?'; there are ")
+    assert second == "no parameter 'G'; did you mean g?"
+
+
 @pytest.mark.parametrize(("word", "meant"), [("initial_", "initial"), ("methd", "method"), ("teval", "t_eval")])
 def test_an_argument_of_a_run(held: dict[str, Any], word: str, meant: str) -> None:
     refuses(f"EG-NAME-UNKNOWN '{word}' {meant}?", lambda: held["Module"].simulate((0, 1), **{word: 1.0}))

@@ -67,7 +67,7 @@ def test_a_spring_preload() -> None:
 
 
 def test_a_chain_between_two_walls_is_a_minimum_of_the_potential() -> None:
-    """Six bars hung at both ends, the first one held aside: SciPy minimises the height under constraints."""
+    """Six bars hung at both ends, the first one held aside: SciPy minimizes the height under constraints."""
     m = eg.Model("catenary", gravity=(0, -9.81, 0))
     previous = m.ground
     for k in range(6):

@@ -133,6 +133,7 @@ SLIPS: list[tuple[list[Any], str]] = [
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1:3", "--range", "t=0:1:4"], "must be equal"),
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1", "--range", "theta=0:2"], "each name once"),
     (["kinematics", FOUR_BAR, *NUMPY, "--range", "theta=0:1", "--out", "x.txt"], "written as .npz or .csv"),
+    (["kinematics", FOUR_BAR, *NUMPY, "--range", "tt=0:1", "--range", "a9=0:1"], "did you mean t?"),
     (["view", FOUR_BAR, *NUMPY, "--range", "theta=0:zz"], "--range theta=0:zz: 'zz' is not a number"),
     (["view", FOUR_BAR, *NUMPY, "--range", "theta=0:30deg"], "not a valid expression"),
     (["view", FOUR_BAR, *NUMPY, "--range", "theta=0:1:1"], "an animation needs two positions"),

@@ -336,3 +336,18 @@ def test_a_stored_notebook_is_a_lesson_that_can_be_handed_out(path: Path) -> Non
             assert cell.outputs, cell.source
     assert checked > 2
     assert images > 0
+
+
+def test_the_commits_that_show_how_to_add_something_are_there() -> None:
+    """A full clone has them; each adds to the package, to a test and, but for functions of modules, to a page."""
+    recipes = re.findall(
+        r"^\| (Recipe: [^|]+) \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert len(recipes) == 8
+    git = ["git", "-C", str(ROOT)]
+    known = subprocess.run([*git, "rev-parse", "--is-shallow-repository"], capture_output=True, text=True, check=False)
+    for subject in recipes if known.stdout == "false\n" else ():
+        command = [*git, "show", "--format=%s", "--name-only", f":/^{subject}"]
+        shown, *files = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
+        assert shown == subject
+        assert {"eomgen", "tests"} <= {file.partition("/")[0] for file in files}

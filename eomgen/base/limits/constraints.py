@@ -11,8 +11,8 @@ from __future__ import annotations
 
 # -- closed ----------------------------------------------------------------------------------------------------------
 EXACT = 1e-15  #: scaled residual of a row that is closed to its rounding, 4 to 5 eps
-SETTLED = 1000.0 * EXACT  #: at which to stop when it falls no longer: rounding of the largest mechanisms
-ACCEPTED = 100.0 * SETTLED  #: largest of a projected or assembled state: what users are told is closed
+CONVERGED = 1000.0 * EXACT  #: at which to stop when it falls no longer: rounding of the largest mechanisms
+ACCEPTED = 100.0 * CONVERGED  #: largest of a projected or assembled state: what users are told is closed
 CONTRADICTION = 100.0 * ACCEPTED  #: of rows that no position closes, or whose rates differ by this part
 SHORT = 1e-8  #: scaled Newton step, whose square, what the step leaves of a smooth row, is below EXACT
 #: Scaled Newton step up to which the term in J J^T, which is as large as the residual, may be left out: with the term a
@@ -37,8 +37,8 @@ FAST = 0.01
 HINDERED = 0.1
 #: A residual below this part of s^2 is a step of a hundredth of s at most, over which s stays what it is.
 NEAR = 0.01
-#: Most that the last pass of straight-line code may leave of a correction, the same as SETTLED of a position.
-LEFT = SETTLED
+#: Most that the last pass of straight-line code may leave of a correction, the same as CONVERGED of a position.
+LEFT = CONVERGED
 
 # -- dependent -------------------------------------------------------------------------------------------------------
 #: Rank at one projected state: J is known to 1e-13 in large mechanisms; directions a thousand times stronger are held.
@@ -57,7 +57,7 @@ SPANNING = 1e-4
 #: Rank of the balance of all bodies, whose rows are products of two such matrices and of levers.
 BALANCE = 10.0 * STATE
 #: Rank of rows of velocities that users give beside the constraints, which are known to ACCEPTED.
-GIVEN = 10.0 * ACCEPTED
+FURTHER_ROWS = 10.0 * ACCEPTED
 #: Part of its length that a further given value must keep when the others are taken out of it, or it contradicts them.
 INDEPENDENT = 1e-6
 #: Length of a scaled gradient that is rounding of entries of size 1: what it belongs to does not move.
@@ -92,9 +92,9 @@ HELD_STEP = 2.5
 # -- the same --------------------------------------------------------------------------------------------------------
 ALIKE = 1e-13  #: relative difference of two inputs that count as one: 500 eps
 
-#: Scaled slope below which a constraint may be a square: one that is closed to SETTLED is off by its root, and has a
+#: Scaled slope below which a constraint may be a square: one that is closed to CONVERGED is off by its root, and has a
 #: slope of twice that.  A circle closes with larger slopes, even where its radius is less than BESIDE.
-FLAT = 2.0 * SETTLED**0.5
+FLAT = 2.0 * CONVERGED**0.5
 #: Scaled step at which a constraint is judged to be a square: far beyond the root of what counts as closed, to which
 #: its zero is found.
 BESIDE = 1e-4

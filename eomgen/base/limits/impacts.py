@@ -12,7 +12,7 @@ TOUCHING = 1e-8
 #: Relative rounding of a rate and of a normal: sums of a few products.
 ROUNDED = 16.0 * EPS
 #: Part of a normal, along which nothing is free to move, that is rounding.
-HELD = 1e-9
+FIXED = 1e-9
 #: Part of the rates below which one counts as 0.
 STILL = 1e-12
 #: Part of the first approach that is left if the impacts of an instant do not die away.

@@ -52,7 +52,7 @@ PERIODIC = 1e-12
 #: Part of the largest force or moment below which a component is shown as 0.
 SHOWN_FORCE = 1e-13
 #: Part of the largest value of a unit below which one is shown as 0: the rounding of a zero.
-SHOWN = 1e-14
+ROUNDED_ZERO = 1e-14
 #: A state that never gets beyond so many times the integrator's absolute tolerance rests: it is shown as 0 below that.
 RESTING = 100.0
 #: By which slopes of an angle may miss whole numbers in a loop that counts as plane: axes are written to nine digits.
@@ -124,4 +124,4 @@ COMPUTED = ROUNDED
 #: Part of the largest principal moment below which the second says nothing of the triangle of three.
 MOMENT = 1e-9
 #: Angular velocity of a body across the axis of its only moment, at velocities of about 1 rad/s; rounding leaves 1e-15.
-ACROSS = 1e-9
+TRANSVERSE = 1e-9

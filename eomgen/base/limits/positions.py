@@ -17,7 +17,7 @@ SAME = 1e-10
 #: Scaled motion too small to tell a direction by: positions are closed to 1e-10.
 UNJUDGED = 1e-6
 #: Scaled motion on either side of a singular position, tried in order.
-LEAPS = (1e-3, 4e-3, 1.6e-2, 6e-2)
+JUMPS = (1e-3, 4e-3, 1.6e-2, 6e-2)
 #: Step of the path's parameter, relative to the path, before the way counts as blocked: 500 roundings.
 BLOCKED = 1e-13
 #: By which a limit may be passed, for rounding and what positions are closed to.

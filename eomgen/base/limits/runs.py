@@ -7,7 +7,7 @@ from .numbers import EPS
 # -- tolerances ------------------------------------------------------------------------------------------------------
 RTOL, ATOL = 1e-8, 1e-10  #: of a run, where nothing is said
 SCIPY_RTOL, SCIPY_ATOL = 1e-3, 1e-6  #: of SciPy's solvers, where they are called as SciPy calls them
-SENSITIVITY_RTOL, SENSITIVITY_ATOL = 1e-9, 1e-11  #: of runs whose derivatives are asked for
+SENSITIVITY_RTOL, SENSITIVITY_ATOL = 1e-9, 1e-11  #: of runs whose derivatives are requested
 LEAST_RTOL = 100.0 * EPS  #: as in SciPy: nothing smaller can be kept
 
 # -- steps -----------------------------------------------------------------------------------------------------------

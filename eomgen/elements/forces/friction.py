@@ -518,7 +518,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
 class JointFriction(PathForce):
     """Friction on a joint's coordinate of rate v (N or N m), such as -[c(v) tanh(v / smoothing) + viscous v].
 
-    The tanh is the regularisation of Andersson, Soderberg and Bjorklund (2007), Tribol. Int. 40, 580-587.  It does not
+    The tanh is the regularization of Andersson, Soderberg and Bjorklund (2007), Tribol. Int. 40, 580-587.  It does not
     depend on the joint's reactions; :class:`ReactionFriction` does.
     """
 

@@ -25,7 +25,7 @@ SHARPNESS = 10.0  #: with which activation changes to deactivation
 
 
 def active_force_length(length: Expr) -> Expr:
-    """Active force over fibre length, both normalised: three bells exp(-((l - b2) / (b3 + b4 l))^2 / 2)."""
+    """Active force over fibre length, both normalized: three bells exp(-((l - b2) / (b3 + b4 l))^2 / 2)."""
     total = length.graph.zero
     for height, middle, width, slope in _ACTIVE:
         x = (length - middle) / (width + slope * length)
@@ -34,13 +34,13 @@ def active_force_length(length: Expr) -> Expr:
 
 
 def passive_force_length(length: Expr) -> Expr:
-    """Passive force over fibre length, both normalised: (exp(4 (l - 1) / 0.6) - 1) / (exp(4) - 1)."""
+    """Passive force over fibre length, both normalized: (exp(4 (l - 1) / 0.6) - 1) / (exp(4) - 1)."""
     g = length.graph
     return (g.apply("exp", _SHAPE * (length - 1.0) / _STRAIN) - 1.0) / (g.apply("exp", _SHAPE) - 1.0)
 
 
 def force_velocity(velocity: Expr) -> Expr:
-    """Force over lengthening velocity, both normalised: d1 log(y + sqrt(y^2 + 1)) + d4, y = d2 v + d3."""
+    """Force over lengthening velocity, both normalized: d1 log(y + sqrt(y^2 + 1)) + d4, y = d2 v + d3."""
     d1, d2, d3, d4 = _VELOCITY
     y = d2 * velocity + d3
     return d1 * velocity.graph.apply("log", y + sqrt(y * y + 1.0)) + d4
@@ -75,7 +75,7 @@ class Muscle(PathForce):
 
     sentence = (
         "A muscle with a rigid tendon pulls the ends of its path together; $a$ is the activation, $l$ and "
-        r"$\dot{l}$ the length of its fibres and its rate, normalised."
+        r"$\dot{l}$ the length of its fibres and its rate, normalised."  # codespell:ignore normalised
     )
     formula = r"F = F_0 [a f_l(l) f_v(\dot{l}) + f_p(l)] \mathrm{cos}(\alpha)"
     uses_value = True

@@ -192,7 +192,7 @@ class Relation(NamedTuple):
     sides: tuple[Formula, ...]
 
 
-class Cases(NamedTuple):
+class Piecewise(NamedTuple):
     """Values and the conditions under which they hold; the last may hold otherwise."""
 
     branches: tuple[tuple[Formula, Formula | None], ...]
@@ -211,7 +211,7 @@ class Words(NamedTuple):
     latex: str
 
 
-Formula = Number | Name | Letter | Sum | Product | Quotient | Power | Call | Relation | Cases | Matrix | Words
+Formula = Number | Name | Letter | Sum | Product | Quotient | Power | Call | Relation | Piecewise | Matrix | Words
 
 
 def times(formula: Formula, factor: Formula) -> Formula:
@@ -286,7 +286,7 @@ class Formulas:
             return Name(f"{x.expr.func.__name__}_{'d' * int(x.variable_count[0][1])}ot")
         if isinstance(x, sympy.Piecewise):
             branches = ((self(value), None if when == sympy.true else self(when)) for value, when in x.args)
-            return Cases(tuple(branches))
+            return Piecewise(tuple(branches))
         kind = type(x).__name__
         if kind in _SIGNS:
             return Relation(_SIGNS[kind], tuple(map(self, x.args)))

@@ -149,7 +149,7 @@ class _LatexWriter(FormulaWriter):
             return f"{name}{power} {inside}"
         return f"{name}{power}{fenced(inside)}"
 
-    def cases(self, formula: tree.Cases) -> str:
+    def piecewise(self, formula: tree.Piecewise) -> str:
         rows = (
             rf"{self.write(value)} & " + (r"\text{otherwise}" if when is None else rf"\text{{if }} {self.write(when)}")
             for value, when in formula.branches
@@ -232,7 +232,7 @@ class _TextWriter(FormulaWriter):
         """Arguments, in which lines are broken last."""
         return ", ".join(map(self.write, formula.arguments)).replace(" ", TIGHT)
 
-    def cases(self, formula: tree.Cases) -> str:
+    def piecewise(self, formula: tree.Piecewise) -> str:
         parts = (
             f"{self.write(value)} otherwise" if when is None else f"{self.write(value)} if {self.write(when)}"
             for value, when in formula.branches
@@ -339,7 +339,7 @@ class _MathMLWriter(FormulaWriter):
         sign = html_text(self.relations.get(formula.sign, formula.sign))
         return row(f"<mo>{sign}</mo>".join(map(self.write, formula.sides)))
 
-    def cases(self, formula: tree.Cases) -> str:
+    def piecewise(self, formula: tree.Piecewise) -> str:
         rows = []
         for value, when in formula.branches:
             condition = "<mtext>otherwise</mtext>" if when is None else row("<mtext>if&#160;</mtext>", self.write(when))
@@ -397,7 +397,7 @@ def width(formula: tree.Formula, names: Notation) -> float:
             return len(formula.function) + fences + inside
         case tree.Relation():
             return sum(map(of, formula.sides)) + SIGN * (len(formula.sides) - 1)
-        case tree.Cases():
+        case tree.Piecewise():
             return FENCES + max(of(x) + (of(when) if when else 9.0) + 2 * COLUMN for x, when in formula.branches)
         case tree.Matrix():
             return FENCES + sum(max(map(of, column)) + COLUMN for column in zip(*formula.rows, strict=True))

@@ -27,11 +27,11 @@ LONG = 20_000  #: operations from which expressions need names for what they sha
 WORK = 100_000  #: nodes that are formed anew to leave out symbols
 CHOICES = 100  #: choices between values up to which their conditions are looked for in their branches
 
-Given = Sequence[tuple[str, Expr]]
+NamedExprs = Sequence[tuple[str, Expr]]
 
 
 def joined_nodes(
-    exprs: Sequence[Expr], named: Given = (), unit: Sequence[Sequence[str]] = ()
+    exprs: Sequence[Expr], named: NamedExprs = (), unit: Sequence[Sequence[str]] = ()
 ) -> tuple[list[Expr], list[tuple[str, Expr]]]:
     """Expressions, and what names in them stand for, with nodes of one function made one node, in a graph of their own.
 
@@ -135,7 +135,7 @@ class Values:
     """
 
     def __init__(
-        self, graph: Graph, order: Sequence[int], names: Sequence[str], named: Given, unit: Sequence[Sequence[str]]
+        self, graph: Graph, order: Sequence[int], names: Sequence[str], named: NamedExprs, unit: Sequence[Sequence[str]]
     ) -> None:
         self.graph, self.order, self.names = graph, order, names
         random = np.random.default_rng(5)

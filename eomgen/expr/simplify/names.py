@@ -62,7 +62,7 @@ def inlined(
             # named without its symbols and numbers, which may cancel
             inner, outer = _parted(expansion, value)
             moved = multiply({((atom, 1),): 1}, outer)
-            put = [_put_in(expansion, factoring, every[n][1], atom, moved) for n in users]
+            put = [_substituted(expansion, factoring, every[n][1], atom, moved) for n in users]
             if inner != value and all(p is not None for p in put):
                 for n, p in zip(users, put, strict=True):
                     replace(n, p or {})
@@ -70,7 +70,7 @@ def inlined(
                 replace(k, inner)
         tried = None
         if is_plain(value, expansion.atoms) or (atom not in fixed and (len(value) == 1 or len(users) == 1)):
-            tried = [_put_in(expansion, factoring, every[n][1], atom, value) for n in users]
+            tried = [_substituted(expansion, factoring, every[n][1], atom, value) for n in users]
         if tried is None or any(p is None for p in tried):
             keep(k, value)
             continue
@@ -95,7 +95,7 @@ def _parted(expansion: Expansion, value: Poly) -> tuple[Poly, Poly]:
     return inner, {plain: x}
 
 
-def _put_in(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, value: Poly) -> Poly | None:
+def _substituted(expansion: Expansion, factoring: Factoring, poly: Poly, atom: int, value: Poly) -> Poly | None:
     """A polynomial with the value of a name in its place, None where that is not known."""
     if not _can_replace(expansion.atoms, poly, atom, value):
         return None

@@ -321,7 +321,7 @@ class ForceSlopes:
         slide = vec.scale(self._kinematics.graph.constant(2.0), self._rates[k].slide)
         return slide if link.parent == GROUND else vec.add(vec.cross(self._twice[link.parent], link.position), slide)
 
-    def _own(self, k: int) -> Composite:
+    def _single(self, k: int) -> Composite:
         """The body of one link: V = [omega] E with the second moments E."""
         J, half = self._inertias[k].inertia, self._kinematics.graph.constant(0.5)
         diagonal = [half * (J[1][1] + J[2][2] - J[0][0]), half * (J[2][2] + J[0][0] - J[1][1])]
@@ -345,7 +345,7 @@ class ForceSlopes:
     def _sum_inwards(self) -> tuple[list[Composite], Entries, Entries, list[Expr]]:
         """Composite bodies, derivatives by v, M (lower triangle), and the forces of gravity."""
         kinematics, links = self._kinematics, self._kinematics.links
-        bodies = [self._own(k) for k in range(len(links))]
+        bodies = [self._single(k) for k in range(len(links))]
         falling: list[Vec3] = []
         for link in links:
             above = falling[link.parent] if link.parent != GROUND else vec.neg(kinematics.mechanism.gravity)

@@ -87,7 +87,7 @@ def clean(axis: np.ndarray) -> list[float]:
 
 
 REMEDY = "give the body that it moves a mass or an inertia; for kinematics alone, check_inertia: note"
-SHOWN = 8  #: bodies that a message names
+LISTED = 8  #: bodies that a message names
 
 
 def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> str:
@@ -123,7 +123,7 @@ def _massless(kinematics: Kinematics) -> str:
     ]
     if not names:
         return ""
-    listed = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+    listed = ", ".join(names[:LISTED]) + (f", ... ({len(names)} in all)" if len(names) > LISTED else "")
     return f"; bodies without mass and inertia: {listed}"
 
 

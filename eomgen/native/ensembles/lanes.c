@@ -481,7 +481,7 @@ static EOMGEN_APART int end_lane_step(eomgen_ensemble *e, lane_run *lanes, int l
     return status;
 }
 
-/* The queue of trajectories and the rounds of steps. Store what is asked for up to now of the lanes that have moved. */
+/* The queue of trajectories and the rounds of steps. Store what is requested up to now of the lanes that have moved. */
 static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run *run, flag moved, double direction)
 {
     const int n = run->n;
@@ -727,7 +727,7 @@ static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_ru
         for (int l = 0; l < W; l++) {
             first[l] = run->node[l] == 1 ? -1 : 0;
         }
-        /* a time asked for may be the start */
+        /* a time requested may be the start */
         sample_lanes(e, method, run, first & run->begins & run->active, direction);
     }
     const int taylor = method == &lane_taylor, begins = any_of(run->active & run->begins);

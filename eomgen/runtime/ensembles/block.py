@@ -157,7 +157,7 @@ class RunBlock:
     t : (k,) array
         Their times.
     samples : (n_x, m, k) array or None
-        Projected states at the times asked for; NaN where a run did not get to.
+        Projected states at the times requested; NaN where a run did not get to.
     status : (k,) int array
         See ``MEANING``; a failed evaluation's code is in `failure`.
     failure, failure_time, steps, rejected, evaluations : (k,) arrays
@@ -359,7 +359,7 @@ def _project_columns(runs: Runs, block: RunBlock, states: Array, times: Array) -
 
 
 Arrays = dict[str, Any]
-GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depend on blocks, threads or workers
+GRAIN = 256  #: runs summarized at a time; fixed, so that rounding does not depend on blocks, threads or workers
 
 
 class Reduction:
@@ -368,7 +368,7 @@ class Reduction:
     Parameters
     ----------
     kept : sequence of str
-        Of the last states ``x``, the ``samples`` where times were asked for, and the events, ``notes``.
+        Of the last states ``x``, the ``samples`` where times were requested, and the events, ``notes``.
     """
 
     def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
@@ -401,7 +401,7 @@ class Statistics(Reduction):
         grains = []
         values = [runs.with_outputs(states[:, j], t) for j, t in enumerate(when)]
         for start in range(0, max(runs.count, 1), GRAIN):
-            parts = [summarise(x[:, start : start + GRAIN]) for x in values]
+            parts = [summarize(x[:, start : start + GRAIN]) for x in values]
             grains.append(stacked(parts, -1))
         return stacked(grains, 0)
 
@@ -452,7 +452,7 @@ def choose_reduction(reduce: Any) -> Reduction:
     raise no_choice(f"{WANTED}, not {reduce!r}")
 
 
-def summarise(values: Array) -> Arrays:
+def summarize(values: Array) -> Arrays:
     """Count, mean, sum of squared deviations, least and greatest (n,) over what is finite in each row."""
     finite = np.isfinite(values)
     count = finite.sum(axis=1)
@@ -564,7 +564,7 @@ def stored_length(folder: str | Path) -> int | None:
 
 
 LARGEST = 16 * GRAIN  #: runs of a block at most
-ROOM = 2**26  #: bytes of samples of a block, roughly
+SAMPLE_BYTES = 2**26  #: bytes of samples of a block, roughly
 RUNS = ("t", "status", "failure", "failure_time", *COUNTS)
 
 #: What is kept of a block, and what is to be said about its runs.
@@ -581,7 +581,7 @@ def choose_size(count: int, bytes_of_a_run: int, workers: int = 1) -> int:
     """Runs of a block: several blocks for each of several workers, in whole grains, within the room."""
     shared = -(-count // (4 * workers)) if workers > 1 else count
     whole = min(max(-(-shared // GRAIN), 1) * GRAIN, LARGEST)
-    fitting = max(ROOM // max(bytes_of_a_run, 1), 1)
+    fitting = max(SAMPLE_BYTES // max(bytes_of_a_run, 1), 1)
     return whole if whole <= fitting else max(fitting // GRAIN * GRAIN, min(fitting, GRAIN))
 
 

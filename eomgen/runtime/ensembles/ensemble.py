@@ -22,7 +22,7 @@ from ...errors import UsageError, bad_data, cannot, ill_typed, no_choice, off_ra
 from ..argument_checks import check_names, require, require_size, unknown, without_dots
 from ..identity import code_digest, digest, origin, plain, spell_input
 from ..inputs import Forcing, Signal, fill_rates, rate_pairs
-from ..kernels import WORDS, place
+from ..kernels import CAUSES, place
 from ..plotting import printed_names
 from ..refusals import refuse_moreau, require_support
 from ..runs.bound_run import Progress, wanted
@@ -52,7 +52,7 @@ from .block import (
     run_block,
     split,
     stored_length,
-    summarise,
+    summarize,
 )
 from .variations import collect_variations, grid_axes, spread_grid
 
@@ -109,7 +109,7 @@ class Ensemble(Result):
     samples : (n_x, m, k) array or None
         States at ``t``.
     t : (m,) array
-        Times asked for; the end of the span where none were.
+        Times requested; the end of the span where none were.
     t_end : (k,) array
         How far each run came (s).
     status : (k,) int array
@@ -160,7 +160,7 @@ class Ensemble(Result):
         status, code = int(self.status[k]), int(self._failure[k])
         message = self._messages.get(k) or MEANING.get(status, f"status {status}")
         if code and k not in self._messages:
-            reason = WORDS.get(code, (f"status {code}",))[0]
+            reason = CAUSES.get(code, (f"status {code}",))[0]
             message += f"; last failure near t = {self._failure_time[k]:.6g} s: {reason}"
         return Failure(k, status, float(self.t_end[k]), message, {name: float(row[k]) for name, row in varied.items()})
 
@@ -208,9 +208,9 @@ class Ensemble(Result):
         if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
-            raise cannot("this ensemble kept no states to summarise; run it with reduce='states' or 'statistics'")
+            raise cannot("this ensemble kept no states to summarize; run it with reduce='states' or 'statistics'")
         else:
-            parts = summarise(self._runs.with_outputs(self.x, self.t_end))
+            parts = summarize(self._runs.with_outputs(self.x, self.t_end))
             spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
             rows = [parts["mean"], spread, parts["least"], parts["greatest"]]
         keys = ("mean", "deviation", "least", "greatest")

@@ -16,11 +16,11 @@ from ...base.algebra import Array, Indices
 from ...base.continuation import LONGEST
 from ...base.limits.constraints import (
     CONTRADICTION,
+    CONVERGED,
     EXACT,
-    GIVEN,
+    FURTHER_ROWS,
     GONE,
     INDEPENDENT,
-    SETTLED,
     STILL,
     STRUCTURE,
 )
@@ -358,7 +358,7 @@ def _assemble_all(
         return x, {}
     differ = varied.starts_differ and layout.n_v <= DENSE  # the same for every block
     if varied.states is None and not constrained and (free or differ):
-        most = max(ROOM // (layout.n_c * layout.n_v + 1), 1)
+        most = max(JACOBIAN_NUMBERS // (layout.n_c * layout.n_v + 1), 1)
         parts = [varied.part(i, i + most) for i in range(0, varied.count, most)]
         result = [_assemble_side_by_side(module, part, t) for part in parts]
         good = np.concatenate([good[:0], *(one for _, one in result)])
@@ -394,7 +394,7 @@ def _assemble_named(module: BoundModel, varied: Variations, columns: list[int], 
 # where a value is to be refused.
 
 
-ROOM = 2**21  #: numbers of Jacobians at a time
+JACOBIAN_NUMBERS = 2**21  #: numbers of Jacobians at a time
 ROUNDS = 12  #: steps of Newton's method
 SHRINK = 0.25  #: largest first scaled step, and largest part of the one before that a further step has
 SAFE = 1e-3  #: least singular value, relative to the largest, of what follows from held values
@@ -445,11 +445,11 @@ class SideBySide:
             size = np.abs(e).max(axis=1, initial=0.0)
             U, steep, V = np.linalg.svd(J[:, :h, free], full_matrices=False)
             decided = (steep[:, -1:] > SAFE * steep[:, :1]).all(axis=1) & (len(free) <= h)
-            done = (size <= EXACT) | (decided & (size <= SETTLED) & (size > 0.5 * before))
+            done = (size <= EXACT) | (decided & (size <= CONVERGED) & (size > 0.5 * before))
             self.good[runs[done]] = True
             z = _times(V.transpose(0, 2, 1), _times(U.transpose(0, 2, 1), e) / steep)
             length = np.abs(z).max(axis=1, initial=0.0)
-            on = decided & ~done & (length <= np.maximum(SHRINK * last, SETTLED))
+            on = decided & ~done & (length <= np.maximum(SHRINK * last, CONVERGED))
             runs, last, before = runs[on], length[on], size[on]
             self.q[np.ix_(free, runs)] -= z[on].T * self.sizes[np.ix_(free, runs)]
         if self.layout.sizes.n_alignments:
@@ -504,7 +504,7 @@ class SideBySide:
         )
         x, free = (v[:, runs] / self.sizes[:n, runs]).T, np.setdiff1d(np.arange(n), fixed)
         rest = (self.C_t(np.concatenate([self.q[:, runs], 0.0 * x.T]), **raw) / self.sizes[n:, runs]).T
-        inverse = np.asarray(np.linalg.pinv(J[:, :, free], rcond=GIVEN), dtype=float)
+        inverse = np.asarray(np.linalg.pinv(J[:, :, free], rcond=FURTHER_ROWS), dtype=float)
         for _ in range(2):
             x[:, free] -= _times(inverse, _times(J, x) + rest)
         speed = np.abs(np.hstack([x[:, : layout.moving], rest])).max(axis=1, initial=1.0)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ...base import algebra
 from ...base.algebra import Array, definite_factor
-from ...base.limits.impacts import BEYOND, ELSEWHERE, HELD, ROUNDED, TOUCHING
+from ...base.limits.impacts import BEYOND, ELSEWHERE, FIXED, ROUNDED, TOUCHING
 from ...base.results import Result, plain, same_keys
 from ...errors import (
     cannot,
@@ -394,6 +394,6 @@ def _rounding(rows: Array, v: Array, B: Array, condition: float, layout: Layout)
     fast = float(np.linalg.norm(v / s))
     rest = ROUNDED * (np.abs(rows) @ np.abs(v) + condition * lengths * fast)
     part = np.linalg.norm((rows @ B), axis=1)
-    fixed = part <= max(HELD, ROUNDED * condition) * lengths
-    rest[fixed] += HELD * lengths[fixed] * fast
+    fixed = part <= max(FIXED, ROUNDED * condition) * lengths
+    rest[fixed] += FIXED * lengths[fixed] * fast
     return rest, fixed

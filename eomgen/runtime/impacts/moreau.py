@@ -103,14 +103,14 @@ class ColumnsWithForces(Columns):
     def __init__(self, others: Columns, forces: ContactForces) -> None:
         super().__init__(others.module, others.t, others.x, others.u, others._steps)
         columns = {f"{what}({name})": (what, name) for name in forces.names for what in MEANS}
-        self.forces, self._own = forces, {name: what for name, what in columns.items() if name not in self.names}
-        self.names = (*self.names, *self._own)
-        self.units = {name: MEANS[what] for name, (what, _) in self._own.items()}
+        self.forces, self._columns = forces, {name: what for name, what in columns.items() if name not in self.names}
+        self.names = (*self.names, *self._columns)
+        self.units = {name: MEANS[what] for name, (what, _) in self._columns.items()}
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self._own:
+        if name not in self._columns:
             return super().__getitem__(name)
-        what, contacts = self._own[name]
+        what, contacts = self._columns[name]
         result: Array = getattr(self.forces, what)(contacts)
         return result
 
@@ -399,11 +399,11 @@ class RigidSteps:
 
 
 NAME = "moreau"
-OWN = ("contact_tolerance", "contact_iterations", "contact_forces")
+OPTIONS = ("contact_tolerance", "contact_iterations", "contact_forces")
 
 
 class ContactWarning(UserWarning):
-    """A run by the method moreau has steps in which the laws of contact are not met as well as asked for."""
+    """A run by the method moreau has steps in which the laws of contact are not met as exactly as requested."""
 
 
 def step_rigidly(
@@ -422,7 +422,7 @@ def step_rigidly(
     """The motion of a mechanism whose contacts between groups are rigid."""
     _require_it(module, method)
     raw = {key: value for key, value in options.items() if value is not None and value is not False}
-    check_names("option of method moreau", raw, OWN, ("method", "step", "t_eval", "progress"))
+    check_names("option of method moreau", raw, OPTIONS, ("method", "step", "t_eval", "progress"))
     if step is None:
         raise incomplete("method moreau needs step=, the size of its steps (s), for example step=1e-3")
     h = check_step("step", step)

@@ -1,1 +1,1 @@
-"""Motions that drivers or a path of coordinates prescribe; packages carry this folder where they can be asked for."""
+"""Motions that drivers or a path of coordinates prescribe; packages carry this folder where they can be requested."""

@@ -35,8 +35,8 @@ from ...base.continuation import (
     find_root,
     interpolate,
 )
-from ...base.limits.constraints import SETTLED
-from ...base.limits.positions import ALIGNED, LEAPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
+from ...base.limits.constraints import CONVERGED
+from ...base.limits.positions import ALIGNED, JUMPS, NULL, POOR, SAME, SINGULAR, UNJUDGED
 from ...base.limits.positions import ASTRAY as ASTRAY_ACROSS
 from ...base.scales import Scales, largest
 from ...errors import EomgenError
@@ -194,7 +194,7 @@ class DrivenPath(StraightPath):
                 return None
             step = -algebra.lstsq(np.vstack([rows, direction]), np.append(e, 0.0), rcond=NULL)
             q, s = self.scales.move(q, step[:-1]), s + float(step[-1])
-            if largest(step) <= SETTLED:
+            if largest(step) <= CONVERGED:
                 there = algebra.svd(rows)[2][-1]
                 return s, q, there * float(np.sign(there @ direction))
         return None
@@ -244,7 +244,7 @@ class ChangePointInterpolant:
         space = self.scales.space
         if space is None:
             return q, first, second
-        return space.normalised(q), space.velocities(q, first), space.velocities(q, second)
+        return space.normalized(q), space.velocities(q, first), space.velocities(q, second)
 
 
 def build_interpolant(
@@ -387,7 +387,7 @@ def find_stop(path: DrivenPath, last: Point) -> Point:
         there = ahead(h)
         return float("nan") if there is None else float(there[2][-1])
 
-    for h in LEAPS:
+    for h in JUMPS:
         if (end := rate(h)) < 0.0 < direction[-1]:
             result = ahead(find_root(rate, 0.0, h, float(direction[-1]), end))
             length = max(abs(path.t1), largest(path.y1 / path.driven.led_scales))  # scaled, of a step of 1 in s
@@ -402,14 +402,14 @@ def find_change_points(
 ) -> tuple[list[tuple[ChangePointInterpolant, float]], list[Singular]]:
     """Interpolants over the change points of a continuation, and the change points themselves, in order."""
     path = continuation.curve
-    leapt = {id(before) for before, _ in continuation.leaps}
+    jumped = {id(before) for before, _ in continuation.jumps}
     points = continuation.points
     crossings: list[tuple[ChangePointInterpolant, float]] = []
     for k in range(len(points) - 1):
         before, after = points[k], points[k + 1]
         here = None
-        if id(before) in leapt or before.tangent.sign != after.tangent.sign:
-            here = find_singular(continuation, _good(points, before, after) if id(before) in leapt else before, after)
+        if id(before) in jumped or before.tangent.sign != after.tangent.sign:
+            here = find_singular(continuation, _good(points, before, after) if id(before) in jumped else before, after)
         elif k + 2 < len(points) and _dips(points[k : k + 3]):
             here = find_singular(continuation, before, points[k + 2])
         if here is not None:
@@ -429,10 +429,10 @@ def _dips(points: Sequence[Point]) -> bool:
 
 
 def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
-    """The last point before a leap that is not too near to the singular position."""
+    """The last point before a jump that is not too near to the singular position."""
     width = after.s - before.s
     return next(
-        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > 0.01 * LEAPS[0]),
+        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > 0.01 * JUMPS[0]),
         points[0],
     )
 

@@ -172,7 +172,7 @@ def keep(
     passed: tuple[Any, ...] | None = None,
     rest: tuple[Any, ...] = (),
 ) -> KinematicAnalysis:
-    """Put an analysis together from its pieces; ``requested`` points were asked for.
+    """Put an analysis together from its pieces; ``requested`` points were requested.
 
     ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``passed`` what was
     passed besides these points, as columns take it, ``rest`` what a Trajectory takes after its header.
@@ -341,7 +341,7 @@ def follow_to_start(
 # -- runs of mechanisms that drivers move entirely ---------------------------------------------------------------------
 
 
-FEWEST = 201  #: points stored where none are asked for
+FEWEST = 201  #: points stored where none are requested
 
 
 def is_driven(module: BoundModel) -> bool:

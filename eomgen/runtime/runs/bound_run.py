@@ -418,5 +418,5 @@ class Run:
 
 
 def watch_run(start: float, end: float, progress: bool | None) -> Progress | None:
-    """What shows the progress of a run: if that is asked for, or by default on a terminal."""
+    """What shows the progress of a run: if that is requested, or by default on a terminal."""
     return Progress(start, end, 0.0 if progress else PATIENCE) if wanted(progress) else None

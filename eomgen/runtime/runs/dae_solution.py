@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 UNCONTROLLED = 1e30  #: absolute tolerance of unknowns that the error test leaves out
 STEPS = 1_000_000  #: at most, between two times wanted
-OWN = ("eventsfn", "num_events", "jacfn", "userdata", "algebraic_idx")  #: options of IDA that are set here
+RESERVED = ("eventsfn", "num_events", "jacfn", "userdata", "algebraic_idx")  #: options of IDA that are set here
 
 
 class Dae:
@@ -173,7 +173,7 @@ class Dae:
         module = self._module
         require_support(module.layout, "dae.solve")
         ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
-        for name in OWN:
+        for name in RESERVED:
             if name in options:
                 raise at_odds(
                     f"dae.solve sets {name} of IDA itself, so it cannot be given; give events= as for simulate"
@@ -233,7 +233,7 @@ class _Steps:
     def step(self) -> str | None:
         """Take one; what is wrong where it fails."""
         self.t_old = self.t
-        for _ in range(2):  # one call tells again where it was, after times before have been asked for
+        for _ in range(2):  # one call tells again where it was, after times before have been requested
             result = self.solver.step(self.t_bound, method="onestep", tstop=self.t_bound)
             self.nfev, self.njev = int(result.nfev), int(result.njev)
             if not result.success:

@@ -111,7 +111,7 @@ class Events:
         self.controllers = {} if controllers is None else _by_event(layout, controllers)
         self.declared = layout.info.events
         self.over = False  #: whether the last reset ended the run
-        self.names, self.last = list[str](), ""  #: last: the event whose new state is asked for, as messages name it
+        self.names, self.last = list[str](), ""  #: last: the event whose new state is requested, as messages name it
         self.model: list[RunEvent] = []
         self.formulas: list[tuple[RunEvent, Expression]] = []
         self.functions: list[RunEvent] = []

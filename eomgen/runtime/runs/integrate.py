@@ -308,7 +308,7 @@ def _plain(value: Any) -> Any:
 # -- limits of joints --------------------------------------------------------------------------------------------------
 
 
-SHOWN = 4  #: limits that a warning names
+LISTED = 4  #: limits that a warning names
 
 
 class LimitWarning(UserWarning):
@@ -340,9 +340,9 @@ def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: fl
     """Tell the line of the user's that called of limits that a run passes."""
     passed = [] if is_inner_run() else passed_limits(trajectory, layout, rtol, atol)
     if passed:
-        more = f", and {len(passed) - SHOWN} more" if len(passed) > SHOWN else ""
+        more = f", and {len(passed) - LISTED} more" if len(passed) > LISTED else ""
         warnings.warn(
-            f"the run passes limits of joints: {'; '.join(passed[:SHOWN])}{more}. Joint limits are not enforced: load "
+            f"the run passes limits of joints: {'; '.join(passed[:LISTED])}{more}. Joint limits are not enforced: load "
             "a robot with limits='stop', or add forces of type stop to a model; limits: off turns this warning off",
             LimitWarning,
             stacklevel=calls_within() + 1,

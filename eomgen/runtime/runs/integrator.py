@@ -93,7 +93,7 @@ class Integrator:
             raise cannot(f"{module.name} has no degree of freedom to integrate; use simulate")
         if Events(module.layout, None).resets:
             raise cannot(f"events of {module.name} reset its state, and an integrator finds no events; simulate it")
-        self._given = (module, method, rtol, atol, max_step, first_step, step)
+        self._arguments = (module, method, rtol, atol, max_step, first_step, step)
         self.module, self.method = module, method
         self._step = check_method(method, step)
         sizes = {"max_step": max_step, "first_step": first_step} if step is None else {"max_step": self._step}
@@ -206,7 +206,7 @@ class Integrator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy works on memory of its own."""
-        return type(self), self._given
+        return type(self), self._arguments
 
     def __repr__(self) -> str:
         return f"<Integrator of {self.module.name}: {self.method}, rtol {self._options['rtol']:g}>"
