@@ -65,7 +65,7 @@ def check_bodies(
         elif body.check == "error":
             requirements.inside(f"{path}.mass", body.mass, NOT_NEGATIVE, remedy)
         if not faults.under(f"{path}.inertia"):
-            if asymmetry(body.inertia, tensor, COMPUTED * scale):
+            if not is_symmetric(body.inertia, None if tensor is None else tensor.tolist(), COMPUTED * scale):
                 result.append((f"{path}.inertia", *ASYMMETRIC))
             else:
                 result += [(path + ".inertia", *flaw[1:]) for flaw in flaws if flaw.key == f".{body.name}.inertia"]
@@ -125,33 +125,28 @@ def _known_points(requirements: Requirements, points: Sequence[Vec3]) -> list[Ar
 ASYMMETRIC = ("the tensor is not symmetric", "entries [i][j] and [j][i] must be equal")
 
 
-def asymmetry(
-    matrix: Sequence[Sequence[Expr]], values: Array | None = None, computed: float = 0.0
-) -> tuple[int, int] | None:
-    """The place of an entry that differs from its mirror image: at ``values`` if they are known, else at random ones.
+def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None, computed: float = 0.0) -> bool:
+    """Whether a tensor equals its mirror image: at its values if they are known, else wherever one looks.
 
-    ``computed`` is what rounding may leave of the entries.
+    ``computed`` is what rounding may leave of its entries (kg m^2).
     """
-    n = len(matrix)
-    pairs = [(i, j) for i in range(n) for j in range(i) if matrix[i][j] != matrix[j][i]]
+    pairs = [(3 * i + j, 3 * j + i) for i, j in ((0, 1), (0, 2), (1, 2)) if inertia[i][j] != inertia[j][i]]
     if not pairs:
-        return None
-    upper, lower = np.transpose([(n * i + j, n * j + i) for i, j in pairs])
-    if values is not None:
-        full = np.reshape(values, -1)
+        return True
+    if tensor is not None:
+        full = np.reshape(tensor, (3, 3))
         atol = max(TENSOR_TERMS * float(np.max(np.abs(full), initial=0.0)), computed)
-        close = np.isclose(full[upper], full[lower], rtol=TENSOR, atol=atol)
-    else:
-        entries, random = [x for row in matrix for x in row], np.random.default_rng(11)
-        points = [random_point(entries, random, signs=draw < TRIES) for draw in range(DRAWS)]
-        drawn = {name: np.array([point[name] for point in points]) for name in points[0]}
-        numbers, bounds = (np.reshape(x, (len(entries), -1)) for x in with_bounds(entries, drawn))
-        size = np.where(np.isfinite(numbers), np.abs(numbers), 0.0).sum(axis=0)
-        apart = numbers[upper] - numbers[lower]
-        known = np.isfinite(apart)
-        alike = (np.abs(apart) <= TENSOR * size) | is_rounding(apart, bounds[upper] + bounds[lower])
-        close = known.any(axis=1) & (alike | ~known).all(axis=1)
-    return None if close.all() else pairs[int(np.argmin(close))]
+        return bool(np.allclose(full, full.T, rtol=TENSOR, atol=atol))
+    entries, random = [x for row in inertia for x in row], np.random.default_rng(11)
+    points = [random_point(entries, random, signs=draw < TRIES) for draw in range(DRAWS)]
+    drawn = {name: np.array([point[name] for point in points]) for name in points[0]}
+    values, bounds = (np.reshape(x, (len(entries), -1)) for x in with_bounds(entries, drawn))
+    size = np.where(np.isfinite(values), np.abs(values), 0.0).sum(axis=0)
+    upper, lower = np.transpose(pairs)
+    apart = values[upper] - values[lower]
+    known = np.isfinite(apart)
+    alike = (np.abs(apart) <= TENSOR * size) | is_rounding(apart, bounds[upper] + bounds[lower])
+    return bool((known.any(axis=1) & (alike | ~known).all(axis=1)).all())
 
 
 def read_parts(reader: Reader, name: str, path: str, values: Mapping[str, Any]) -> list[MassProperties]:
@@ -371,7 +366,7 @@ def _body_of_mass(
     plane = _plane(tensor)
     axis = None if plane is None else vec.transpose(rotation)[plane]
     if rotation != reader.identity:  # which mirrors the upper triangle
-        if asymmetry(tensor):
+        if not is_symmetric(tensor):
             reader.fault(f"{path}.inertia", *ASYMMETRIC, code="EG-INERTIA")
         tensor = rotate_symmetric(rotation, tensor)
     moment: Vec3 | None = None
