@@ -251,7 +251,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "q_reference": list(mobility.q_reference),
         **describe_start(kinematics),
         "length_scale": mobility.length_scale,
-        "reports_limits": m.defaults.reports_limits,
+        "limits_told": m.defaults.limits_told,
         "limits": {name: dict(of) for j in m.joints for name, of in zip(j.coordinates, j.limits, strict=False) if of},
         "system": _system(equations),
         "baumgarte": None if c.stabilised is None else list(c.stabilised),

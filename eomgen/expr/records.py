@@ -2,7 +2,7 @@
 
 The standard library compiles six methods for each class when it is defined, which for all the classes of eomgen takes
 a fifth of the time to its first result.  Here they are methods of the base.  Fields, defaults, ``replace``, ``fields``,
-equality, hashes and errors are the same.
+equality and hashes are the same.
 """
 
 from __future__ import annotations

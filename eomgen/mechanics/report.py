@@ -176,7 +176,7 @@ def _beyond_limits(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     m, at = kinematics.mechanism, dict(zip(kinematics.names, mobility.q_reference, strict=True))
     declared = [pair for j in m.joints for pair in zip(j.coordinates, j.limits, strict=False)]
     result = []
-    for name, limits in declared if m.defaults.reports_limits and not mobility.assumed else ():
+    for name, limits in declared if m.defaults.limits_told and not mobility.assumed else ():
         for key, limit in limits:
             beyond = {"lower": limit - at.get(name, limit), "upper": at.get(name, limit) - limit}.get(key, 0.0)
             if beyond > SLACK * (1.0 + abs(limit)):

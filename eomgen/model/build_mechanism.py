@@ -124,7 +124,7 @@ def build(description: Description) -> Mechanism:
     independent = _independent(reader, values.get("independent", ()))
     simulation = _simulation(reader, values.get("simulation", {}))
     doc = reader.text("doc", values.get("doc", ""))
-    reports_limits = _limit_notes(reader, values.get("limits"))
+    limits_told = _limit_notes(reader, values.get("limits"))
     check_inertia = reader.check_word("check_inertia", values.get("check_inertia", True))
 
     if not (bare or bodies or faults.under("bodies")):
@@ -170,7 +170,7 @@ def build(description: Description) -> Mechanism:
         check_inertia=check_inertia,
         negative=negative,
         requirements=tuple(reader.requirements.all),
-        defaults=RunDefaults(initial, others, guess, simulation, reports_limits),
+        defaults=RunDefaults(initial, others, guess, simulation, limits_told),
         presentation=Presentation(
             doc=doc,
             latex=dict(reader.latex),

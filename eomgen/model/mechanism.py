@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -236,7 +237,7 @@ class RunDefaults(Record):
     initial_outputs: Mapping[str, Expr] = field(default_factory=dict)  #: by output, in its unit
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
     simulation: Simulation = Simulation()
-    reports_limits: bool = True  #: whether runs that pass a limit of a joint say so
+    limits_told: bool = True  #: whether runs that pass a limit of a joint say so
 
 
 class Presentation(Record):
@@ -345,7 +346,7 @@ class Mechanism(Record):
 ASIDE = frozenset(
     (
         *("doc", "docs", "latex", "lines", "written_paths", "place", "graph", "functions", "file", "requirements"),
-        *("presentation", "reports_limits", "of_velocities"),
+        *("presentation", "limits_told", "of_velocities"),
     )
 )
 
@@ -387,6 +388,8 @@ def _spell(value: Any, graph: Graph, known: dict[int, str]) -> Any:
     """A value as what has one exact ``repr``, the same in every process."""
     if value is None or isinstance(value, (str, int, float, bool, type)):
         return value if not isinstance(value, type) else value.__qualname__
+    if isinstance(value, Enum):
+        return value.name
     if isinstance(value, Expr):
         return ("node", _spell_node(value, known) if value.graph is graph else _spell_node(value, {}))
     if isinstance(value, Mapping):

@@ -107,7 +107,7 @@ class ModelInfo:
     start_fixed: Mapping[str, Sequence[int]] = {}  #: initial values that no tape can play
     start_terms: Mapping[str, Sequence[Any]] = {}  #: section -> names and tape
     start_slopes: Sequence[Any] = ((), ((), (), ()))  #: name and place in p of each derivative; tape
-    reports_limits: bool = True
+    limits_told: bool = True
     events: Sequence[Mapping[str, Any]] = ()
     resets: Sequence[Sequence[int]] = ()  #: event, and place in x of what it gives a value
     clocks: Sequence[Mapping[str, Any]] = ()

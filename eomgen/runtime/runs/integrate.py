@@ -321,7 +321,7 @@ def passed_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: flo
     A coordinate that rests at its limit may be beyond it by what the tolerances of the run leave of it.
     """
     result: list[str] = []
-    for name, limits in layout.limits.items() if layout.info.reports_limits else ():
+    for name, limits in layout.limits.items() if layout.info.limits_told else ():
         for key in ("lower", "upper", "velocity"):
             limit = limits.get(key)
             column = name if key != "velocity" else f"{name}_dot"
