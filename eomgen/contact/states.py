@@ -28,6 +28,7 @@ from ..elements.kinds import (
     by,
     define,
     items,
+    kind,
     ref,
     typed_schema,
 )
@@ -143,10 +144,7 @@ def _shapes_of_entry(value: Any) -> list[ShapeParts]:
 CORNERS = 64  #: most corners of a polygon
 
 
-class Corners(Places):
-    """A list of corners [x, y]."""
-
-    schema = array(array(ref("expression"), 2, 2), 3, CORNERS)
+Corners = kind("A list of corners [x, y].", array(array(ref("expression"), 2, 2), 3, CORNERS), base=Places)
 
 
 class On(MarkerReference):

@@ -1,9 +1,9 @@
-"""Elements, kinds of keys: one class a kind, and a key of an entry is an object of its kind.
+"""Elements, kinds of keys: one class or row a kind, and a key of an entry is an object of its kind.
 
 From a kind follow all uses of a key: how YAML and Python give it (:meth:`Field.read`, :meth:`Field.reference`), its
 JSON Schema, the documentation and annotation of an argument, where a dimension is looked up (:meth:`Field.part`), how
 the value in an instance of a component is made of that in the component (:meth:`Field.map`), and what a model file
-leaves out (:meth:`Field.is_default`).  A new kind is one class.  ``reader`` is the
+leaves out (:meth:`Field.is_default`).  A new kind is one class, or a row :func:`kind`.  ``reader`` is the
 :class:`~eomgen.model.values.Reader` of a model, ``visitor`` a :class:`~eomgen.model.visit.Visitor`, ``refer`` the
 :class:`~eomgen.model.handles.References` of a model in Python.
 """
@@ -110,6 +110,8 @@ class Field:
     schema: ClassVar[Schema] = {}
     defines: ClassVar[Mapping[str, Schema | Callable[[], Schema]]] = {}  #: what the schema refers to
     holds: str = ""  #: what a visitor changes of it: vector, marker, latex, or the names coordinate, body
+    by_coordinate: ClassVar[bool] = False  #: whether it may be a mapping of coordinates to what it holds, or scalars
+    refers: ClassVar[str] = ""  #: to what a handle in its place refers: marker or joint
     joins: ClassVar[bool] = False  #: whether the method has an argument for each of its two ends
     parts: ClassVar[Fields] = {}  #: keys within it
 
@@ -160,6 +162,22 @@ class Field:
         return self.argument
 
     # -- values ---------------------------------------------------------------------------------------------------
+    def read_square(self, reader: Any, path: str, value: Any, size: int) -> Any:
+        """The rows of a square matrix, or of one with the diagonal that is given; None, and a fault, if it is none."""
+        listed = items(value) or ()
+        rows = [items(part) for part in listed] if len(listed) == size else [None, []]
+        if all(row is None for row in rows):
+            diagonal = [reader.expression(f"{path}[{k}]", x, self.level) for k, x in enumerate(listed)]
+            return tuple(tuple(x if i == j else reader.graph.zero for j in range(size)) for i, x in enumerate(diagonal))
+        if all(row is not None and len(row) == size for row in rows):
+            every = [enumerate(row or ()) for row in rows]
+            return tuple(
+                tuple(reader.expression(f"{path}[{i}][{j}]", x, self.level) for j, x in row)
+                for i, row in enumerate(every)
+            )
+        reader.wrong(path, value, self)
+        return None
+
     def read(self, reader: Any, path: str, value: Any) -> Any:
         """What a value means; a fault is noted at ``path``, and None or a stand-in returned, where it means nothing."""
         raise NotImplementedError(f"{type(self).__name__} is read with the rest of its entry")
@@ -170,10 +188,14 @@ class Field:
 
     def reference(self, value: Any, refer: Any) -> Any:
         """A value of a call in Python as a model file would write it: names of markers and joints for handles."""
-        return value
+        one = getattr(refer, self.refers) if self.refers else lambda value: value
+        return [one(part) for part in items(value) or [value]] if self.joins else one(value)
 
     def map(self, value: Any, visitor: Any) -> Any:
         """A value as a visitor changes what it holds; what has not the form of the kind stays as it is."""
+        if self.by_coordinate and isinstance(value, Mapping):
+            one = getattr(visitor, self.holds or "scalar")
+            return {visitor.coordinate(str(name)): one(part) for name, part in value.items()}
         if isinstance(value, list | tuple) and self.holds:
             return [self.map(part, visitor) for part in value]
         no_name = self.holds in ("coordinate", "body") and not isinstance(value, str)
@@ -181,7 +203,8 @@ class Field:
 
     def is_default(self, value: Any) -> bool:
         """Whether leaving a value out means the same."""
-        return value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0)
+        nothing = value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0)
+        return nothing or (self.default == (0, 0, 0) and is_zero(value))
 
     def part(self, path: Sequence[str]) -> Field | None:
         """The key of a scalar within it, behind these words; itself where it has no parts."""
@@ -217,6 +240,15 @@ def by(method: str) -> Any:
     return lambda self, reader, path, value: getattr(reader, method)(path, value)
 
 
+def kind(
+    doc: str, schema: Any = None, argument: str = "", annotation: str = "", base: type[Field] = Field, **rest: Any
+) -> type[Field]:
+    """A kind without code of its own: its documentation, its schema or :func:`define`, and other attributes."""
+    schema, rest["defines"] = schema if isinstance(schema, tuple) else (schema, {})
+    given = {"schema": schema, "argument": argument, "annotation": annotation}
+    return type("Kind", (base,), {"__doc__": doc, **rest, **{name: x for name, x in given.items() if x}})
+
+
 # -- words, names and plain numbers -----------------------------------------------------------------------------------
 class Text(Field):
     """A text."""
@@ -226,40 +258,20 @@ class Text(Field):
     read = by("text")
 
 
-class Unit(Text):
-    """A unit, such as mm or N*m/rad."""
+Unit = kind("A unit, such as mm or N*m/rad.", base=Text)
 
 
-class Latex(Text):
-    """The LaTeX of a symbol, such as \\theta_1."""
-
-    holds = "latex"
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {visitor.coordinate(str(name)): visitor.latex(part) for name, part in value.items()}
-        return super().map(value, visitor)
-
-
-class Latexes(Latex):
-    """The LaTeX of a symbol, a list of them, or a mapping of coordinates to them."""
-
-    argument, annotation = "str, sequence or mapping of str", "str | Sequence[str] | Mapping[str, str]"
-    schema = any_of(_TEXT, array({"type": ["string", "null"]}), _mapping(_TEXT, propertyNames=ref("name")))
-
-
-class Name(Field):
-    """A name."""
-
-    argument, annotation = "str or symbol", "Any"
-    schema, defines = define("name", {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST})
-
-
-class Names(Field):
-    """A list of names."""
-
-    argument, annotation = "sequence of str", "Sequence[Any]"
-    schema = array(ref("name"))
+Latex = kind("The LaTeX of a symbol, such as \\theta_1.", base=Text, holds="latex", by_coordinate=True)
+Latexes = kind(
+    "The LaTeX of a symbol, a list of them, or a mapping of coordinates to them.",
+    any_of(_TEXT, array({"type": ["string", "null"]}), _mapping(_TEXT, propertyNames=ref("name"))),
+    "str, sequence or mapping of str",
+    "str | Sequence[str] | Mapping[str, str]",
+    Latex,
+)
+_NAME = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST}
+Name = kind("A name.", define("name", _NAME), "str or symbol", "Any")
+Names = kind("A list of names.", array(ref("name")), "sequence of str", "Sequence[Any]")
 
 
 class SomeNames(Field):
@@ -276,12 +288,16 @@ class SomeNames(Field):
         return listed
 
 
-class Reference(Field):
-    """A name, with those of instances and of bodies before it: ``leg1.foot.tip``."""
-
-    schema, defines = define(
-        "reference", {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
-    )
+_DOTTED = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
+BodyName = kind(
+    "The name of a body.",
+    define("reference", _DOTTED),  # with those of instances before it: leg1.foot
+    "handle or str",
+    "Any",
+    read=by("body"),
+    holds="body",
+    refers="marker",
+)
 
 
 class Choice(Field):
@@ -300,20 +316,14 @@ class Choice(Field):
         return reader.choice(path, value, self)
 
 
-class Flag(Field):
-    """True or false."""
-
-    argument, annotation = "bool", "bool"
-    schema = _FLAG
-    read = by("flag")
-
-
-class Check(Field):
-    """True or false, error, note or off."""
-
-    argument, annotation = "bool or {'error', 'note', 'off'}", "bool | str"
-    schema = enum(True, False, *CHECKS)
-    read = by("check_word")
+Flag = kind("True or false.", _FLAG, "bool", "bool", read=by("flag"))
+Check = kind(
+    "True or false, error, note or off.",
+    enum(True, False, *CHECKS),
+    "bool or {'error', 'note', 'off'}",
+    "bool | str",
+    read=by("check_word"),
+)
 
 
 class Times(Field):
@@ -367,10 +377,7 @@ class PositiveNumber(Number):
         return result
 
 
-class Count(Field):
-    """A whole number greater than 0."""
-
-    schema = _WHOLE
+Count = kind("A whole number greater than 0.", _WHOLE)
 
 
 class Numbers(Field):
@@ -383,29 +390,15 @@ class Numbers(Field):
         return [*value] if isinstance(value, range) else value
 
 
-class Grid(Field):
-    """A list of lists of numbers, a row for each x."""
-
-    argument, annotation = "2-D array", "Any"
-    schema = array(array(_NUMBER), 2)
-
-
-class File(Field):
-    """The path of a file."""
-
-    schema = _TEXT
-    read = by("file")
-
-
-class Table(Field):
-    """A mapping."""
-
-
-class Functions(Field):
-    """A list of names of C functions, null for one that is not there."""
-
-    argument, annotation = "sequence", "Sequence[Any]"
-    schema = array({"anyOf": [ref("name"), {"type": "null"}]})
+Grid = kind("A list of lists of numbers, a row for each x.", array(array(_NUMBER), 2), "2-D array", "Any")
+File = kind("The path of a file.", _TEXT, read=by("file"))
+Table = kind("A mapping.")
+Functions = kind(
+    "A list of names of C functions, null for one that is not there.",
+    array(any_of(ref("name"), {"type": "null"})),
+    "sequence",
+    "Sequence[Any]",
+)
 
 
 # -- expressions ------------------------------------------------------------------------------------------------------
@@ -440,15 +433,14 @@ class Vector(Scalar):
     def absent(self, reader: Any) -> Any:
         return (reader.stand_in,) * 3
 
-    def is_default(self, value: Any) -> bool:
-        return super().is_default(value) or (self.default == (0, 0, 0) and is_zero(value))
 
-
-class Value(Scalar):
-    """A number or an expression for a joint, three of them [x, y, z] for a body."""
-
-    argument, annotation = "scalar or sequence of three", "Value | Sequence[Value]"
-    schema = any_of(ref("expression"), ref("vector"))
+Value = kind(
+    "A number or an expression for a joint, three of them [x, y, z] for a body.",
+    any_of(ref("expression"), ref("vector")),
+    "scalar or sequence of three",
+    "Value | Sequence[Value]",
+    Scalar,
+)
 
 
 class Scalars(Field):
@@ -467,35 +459,18 @@ class Scalars(Field):
     holds = "vector"
 
 
-class Two(Scalars):
-    """A list of two numbers or expressions."""
-
-    argument, annotation = "sequence of two", "Sequence[Value]"
-    schema = array(ref("expression"), 2, 2)
-    count = 2
-
-
-class Radii(Two):
-    """Two numbers or expressions."""
-
-
-class Places(Scalars):
-    """A list of points [x, y]."""
-
-    schema = array(array(ref("expression"), 2, 2), 2)
-
-
-class Matrix(Scalars):
-    """A list of rows, each a list of numbers or expressions."""
-
-    schema = array(array(ref("expression")))
-
-
-class Rotation(Matrix):
-    """The axes of a frame as columns."""
-
-    says = Matrix.says
-    read = by("turn_of_matrix")
+Two = kind(
+    "A list of two numbers or expressions.",
+    array(ref("expression"), 2, 2),
+    "sequence of two",
+    "Sequence[Value]",
+    Scalars,
+    count=2,
+)
+Radii = kind("Two numbers or expressions.", base=Two)
+Places = kind("A list of points [x, y].", array(array(ref("expression"), 2, 2), 2), base=Scalars)
+Matrix = kind("A list of rows, each a list of numbers or expressions.", array(array(ref("expression"))), base=Scalars)
+Rotation = kind(Matrix.says, base=Matrix, read=by("turn_of_matrix"))  # the axes of a frame as columns
 
 
 class Matrix6(Scalars):
@@ -505,18 +480,7 @@ class Matrix6(Scalars):
     schema = any_of(array(ref("expression"), 6, 6), array(array(ref("expression"), 6, 6), 6, 6))
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
-        listed, zero = items(value) or (), reader.graph.zero
-        rows = [items(part) for part in listed] if len(listed) == 6 else []
-        if rows and all(row is None for row in rows):
-            diagonal = [reader.expression(f"{path}[{k}]", x, self.level) for k, x in enumerate(listed)]
-            return tuple(tuple(x if i == j else zero for j in range(6)) for i, x in enumerate(diagonal))
-        if rows and all(row is not None and len(row) == 6 for row in rows):
-            return tuple(
-                tuple(reader.expression(f"{path}[{i}][{j}]", x, self.level) for j, x in enumerate(row or ()))
-                for i, row in enumerate(rows)
-            )
-        reader.wrong(path, value, self)
-        return None
+        return self.read_square(reader, path, value, 6)
 
     def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
         """Three forces, then three torques; three lengths, then three angles."""
@@ -524,30 +488,25 @@ class Matrix6(Scalars):
         return None if result is None else result.times(LENGTH, -sum(index < 3 for index in (place[0], place[-1])))
 
 
-class Rates(Field):
-    """A mapping of names to expressions."""
-
-    argument, annotation = "mapping", "Mapping[Any, Value]"
-    schema = _mapping(ref("expression"))
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        if not isinstance(value, Mapping):
-            return value
-        return {visitor.coordinate(str(name)): visitor.scalar(x) for name, x in value.items()}
-
-
-class CoordinateForces(Rates):
-    """A mapping of coordinates to expressions, or a list of one expression for each coordinate."""
-
-    schema = any_of(array(ref("expression")), _mapping(ref("expression")))
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        return super().map(value, visitor) if isinstance(value, Mapping) else visitor.vector(value)
+Rates = kind(
+    "A mapping of names to expressions.",
+    _mapping(ref("expression")),
+    "mapping",
+    "Mapping[Any, Value]",
+    by_coordinate=True,
+)
+CoordinateForces = kind(
+    "A mapping of coordinates to expressions, or a list of one expression for each coordinate.",
+    any_of(array(ref("expression")), _mapping(ref("expression"))),
+    base=Rates,
+    holds="vector",
+)
 
 
-class Factors(Rates):
+class Factors(Field):
     """A mapping of coordinates to numbers or expressions."""
 
+    argument, annotation, by_coordinate = "mapping", "Mapping[Any, Value]", True
     schema = _mapping(ref("expression"), minProperties=1)
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
@@ -608,19 +567,7 @@ class Inertia(Wheels):
             raw = {key: reader.expression(f"{path}.{key}", value[key]) for key in self.names if key in value}
             xx, yy, zz, xy, xz, yz = (raw.get(key, zero) for key in self.names)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-        parts = items(value)
-        if parts is not None and len(parts) == 3:
-            rows = [items(part) for part in parts]
-            if all(row is not None and len(row) == 3 for row in rows):
-                return tuple(reader.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
-            if all(row is None for row in rows):
-                a, b, c = reader.vector(path, parts)
-                return ((a, zero, zero), (zero, b, zero), (zero, zero, c))
-        reader.wrong(path, value, self)
-        return ((reader.stand_in,) * 3,) * 3
-
-    def is_default(self, value: Any) -> bool:
-        return super().is_default(value) or is_zero(value)
+        return self.read_square(reader, path, value, 3) or ((reader.stand_in,) * 3,) * 3
 
 
 # -- axes, frames and markers -----------------------------------------------------------------------------------------
@@ -638,27 +585,22 @@ class Axis(Field):
         return super().is_default(value) or (isinstance(value, str) and value == self.default)
 
 
-class TwoAxes(Field):
-    """Two directions at right angles, each x, y, z, -x, -y, -z or three numbers."""
-
-    argument, annotation = "two of str or three floats", "Sequence[Any]"
-    schema = array(ref("axis"), 2, 2)
-
-
-class FrameAxes(Field):
-    """A mapping of two of x, y, z to x, y, z, -x, -y, -z or three numbers."""
-
-    schema = object_schema(dict.fromkeys("xyz", ref("axis"))) | {"minProperties": 2, "maxProperties": 2}
-    read = by("turn_of_axes")
-
-
-class Placement(Field):
-    """A position [x, y, z] or {at, rpy}."""
-
-    schema, defines = define("placement", lambda: any_of(ref("vector"), table_schema(MARKER)))
-    read = by("named_frame")
-
-
+TwoAxes = kind(
+    "Two directions at right angles, each x, y, z, -x, -y, -z or three numbers.",
+    array(ref("axis"), 2, 2),
+    "two of str or three floats",
+    "Sequence[Any]",
+)
+FrameAxes = kind(
+    "A mapping of two of x, y, z to x, y, z, -x, -y, -z or three numbers.",
+    object_schema(dict.fromkeys("xyz", ref("axis"))) | {"minProperties": 2, "maxProperties": 2},
+    read=by("turn_of_axes"),
+)
+Placement = kind(
+    "A position [x, y, z] or {at, rpy}.",
+    define("placement", lambda: any_of(ref("vector"), table_schema(MARKER))),
+    read=by("named_frame"),
+)
 MARKER: Fields = {
     "at": Vector("position in body axes (m)", default=(0, 0, 0), dimension=LENGTH),
     "rpy": Vector("fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0), dimension=NONE),
@@ -701,28 +643,21 @@ class MarkerReference(Field):
     argument, annotation = "handle or str", "Any"
     holds = "marker"
     schema, defines = define("marker", lambda: any_of(ref("reference"), table_schema(PLACED)))
-    parts = MARKER
-
+    parts, refers = MARKER, "marker"
     read = by("marker")
 
-    def reference(self, value: Any, refer: Any) -> Any:
-        return refer.marker(value)
 
-
-class Pair(Field):
-    """A list of two markers, each a body, body.marker, ground or {body, at, rpy}."""
-
-    argument, annotation = "handles or str", "Sequence[Any]"
-    holds = "marker"
-    schema, defines = define("pair", array(ref("marker"), 2, 2))
-    parts, joins = MARKER, True
-
-    read = by("pair")
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return [refer.marker(part) for part in items(value) or [value]]
-
-
+Pair = kind(
+    "A list of two markers, each a body, body.marker, ground or {body, at, rpy}.",
+    define("pair", array(ref("marker"), 2, 2)),
+    "handles or str",
+    "Sequence[Any]",
+    read=by("pair"),
+    holds="marker",
+    refers="marker",
+    parts=MARKER,
+    joins=True,
+)
 CYLINDER: Fields = {
     "around": MarkerReference("marker whose z axis is the axis of the cylinder", required=True),
     "radius": Scalar("radius (m)", required=True, dimension=LENGTH, allowed=POSITIVE),
@@ -796,39 +731,23 @@ class Via(Field):
 
 
 # -- joints, coordinates and bodies -----------------------------------------------------------------------------------
-class BodyName(Reference):
-    """The name of a body."""
-
-    argument, annotation = "handle or str", "Any"
-    holds = "body"
-    schema = ref("reference")
-    read = by("body")
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return refer.marker(value)
-
-
-class JointReference(Reference):
+class JointReference(Field):
     """The name of a joint, or of one coordinate of a joint."""
 
     argument, annotation = "handle or str", "Any"
-    holds = "coordinate"
+    holds, refers = "coordinate", "joint"
     schema = ref("reference")
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
         return reader.coordinate(path, value, self.measure)
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return refer.joint(value)
 
 
 class JointPair(Field):
     """A list of two joints, or coordinates of joints."""
 
     argument, annotation = "handles or str", "Sequence[Any]"
-    holds = "coordinate"
+    holds, refers, joins = "coordinate", "joint", True
     schema = array(ref("reference"), 2, 2)
-    joins = True
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
         parts = items(value)
@@ -840,9 +759,6 @@ class JointPair(Field):
             reader.fault(path, f"{a.name!r} is named twice", "name two different coordinates", "EG-CONFLICT")
             return None
         return None if a is None or b is None else (a, b)
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return [refer.joint(part) for part in items(value) or [value]]
 
 
 _SIZE: dict[str, Any] = {"allowed": NOT_NEGATIVE, "remedy": "give the largest size, 0 or positive"}
@@ -934,13 +850,7 @@ POINT: Fields = {
 }
 
 
-class Points(BodyParts):
-    """A list of points {mass, at}."""
-
-    schema, defines = define("points", lambda: array(table_schema(POINT)))
-    parts = POINT
-
-
+Points = kind("A list of points {mass, at}.", define("points", array(table_schema(POINT))), base=BodyParts, parts=POINT)
 DISPLAY: Fields = {
     "shape": Choice("kind of shape", required=True, choices=("mesh", "box", "cylinder", "sphere", "capsule")),
     "file": Text("file of a mesh (STL, OBJ or DAE), read when the model is drawn"),
@@ -953,55 +863,35 @@ DISPLAY: Fields = {
 }
 
 
-class Display(BodyParts):
-    """A list of shapes {shape, ...}."""
-
-    schema, defines = define("display", lambda: array(table_schema(DISPLAY)))
-    parts = DISPLAY
-
-
+Display = kind(
+    "A list of shapes {shape, ...}.", define("display", array(table_schema(DISPLAY))), base=BodyParts, parts=DISPLAY
+)
 # -- instances of components ------------------------------------------------------------------------------------------
 ROUNDS = 1000  #: most instances that one entry makes
 
 
-class Prefix(Field):
-    """The beginning of names."""
-
-    schema: ClassVar[Schema] = {"type": "string", "pattern": "^([A-Za-z][A-Za-z0-9_]*)?$"}
-
-
-class Loops(Field):
-    """A mapping of variables to lists, counts or {from, to, step}."""
-
-    schema = _mapping(
-        {
-            "anyOf": [
-                array(_NUMBER, 1, ROUNDS),
-                {"type": "integer", "minimum": 1, "maximum": ROUNDS},
-                object_schema({key: {"type": "number"} for key in ("from", "to", "step")}, ["to"]),
-            ]
-        },
+Prefix = kind("The beginning of names.", {"type": "string", "pattern": "^([A-Za-z][A-Za-z0-9_]*)?$"})
+Loops = kind(
+    "A mapping of variables to lists, counts or {from, to, step}.",
+    _mapping(
+        any_of(
+            array(_NUMBER, 1, ROUNDS),
+            {"type": "integer", "minimum": 1, "maximum": ROUNDS},
+            object_schema({key: {"type": "number"} for key in ("from", "to", "step")}, ["to"]),
+        ),
         propertyNames=ref("name"),
         minProperties=1,
-    )
-
-
-class AttachedTo(Field):
-    """A marker, or a mapping of attachments to markers."""
-
-    schema = any_of(ref("marker"), _mapping(ref("marker"), propertyNames=ref("name")))
-
-
-class Values(Field):
-    """A mapping of names to numbers or expressions."""
-
-    schema = _mapping(ref("expression"))
-
-
-class Measured(Field):
-    """A mapping of names to numbers, expressions or {value, unit}."""
-
-    schema = _mapping(any_of(ref("expression"), object_schema({"value": ref("expression"), "unit": _TEXT}, ["value"])))
+    ),
+)
+AttachedTo = kind(
+    "A marker, or a mapping of attachments to markers.",
+    any_of(ref("marker"), _mapping(ref("marker"), propertyNames=ref("name"))),
+)
+Values = kind("A mapping of names to numbers or expressions.", _mapping(ref("expression")))
+Measured = kind(
+    "A mapping of names to numbers, expressions or {value, unit}.",
+    _mapping(any_of(ref("expression"), object_schema({"value": ref("expression"), "unit": _TEXT}, ["value"]))),
+)
 
 
 # -- lists in any form ------------------------------------------------------------------------------------------------
