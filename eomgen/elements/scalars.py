@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -128,6 +128,23 @@ def axes_of(sequence: str) -> tuple[int, int, int]:
 def elementary(axis: int, angle: Scalar) -> list[list[Scalar]]:
     """Rotation about axis 0, 1 or 2."""
     return about(axis, cos(angle), sin(angle))
+
+
+def turned(axes: Sequence[int], angles: Iterable[Scalar]) -> list[list[Scalar]]:
+    """R = R_a(q1) R_b(q2) ..., intrinsic: each turn is about an axis of the frame that those before it made."""
+    return reduce(times, map(elementary, axes, angles), [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
+
+def axes_of_turns(axes: Sequence[int], angles: Sequence[Scalar], sign: int) -> list[list[Scalar]]:
+    """The axis of each turn, taken through the later turns (body axes, -1) or the earlier ones (ground axes, 1)."""
+    turns = [*map(elementary, axes, angles)]
+    result = []
+    for n, axis in enumerate(axes):
+        column = [[int(k == axis)] for k in range(3)]
+        for turn in turns[n + 1 :] if sign < 0 else reversed(turns[:n]):
+            column = times(transpose(turn) if sign < 0 else turn, column)
+        result.append([x for (x,) in column])
+    return result
 
 
 # -- what comes in and goes out ---------------------------------------------------------------------------------------
