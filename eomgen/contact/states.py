@@ -28,7 +28,6 @@ from ..elements.kinds import (
     by,
     define,
     items,
-    kind,
     ref,
     typed_schema,
 )
@@ -144,7 +143,10 @@ def _shapes_of_entry(value: Any) -> list[ShapeParts]:
 CORNERS = 64  #: most corners of a polygon
 
 
-Corners = kind("A list of corners [x, y].", array(array(ref("expression"), 2, 2), 3, CORNERS), base=Places)
+class Corners(Places):
+    """A list of corners [x, y]."""
+
+    schema = array(array(ref("expression"), 2, 2), 3, CORNERS)
 
 
 class On(MarkerReference):

@@ -459,6 +459,12 @@ class Scalars(Field):
     holds = "vector"
 
 
+class Places(Scalars):
+    """A list of points [x, y]."""
+
+    schema = array(array(ref("expression"), 2, 2), 2)
+
+
 Two = kind(
     "A list of two numbers or expressions.",
     array(ref("expression"), 2, 2),
@@ -468,7 +474,6 @@ Two = kind(
     count=2,
 )
 Radii = kind("Two numbers or expressions.", base=Two)
-Places = kind("A list of points [x, y].", array(array(ref("expression"), 2, 2), 2), base=Scalars)
 Matrix = kind("A list of rows, each a list of numbers or expressions.", array(array(ref("expression"))), base=Scalars)
 Rotation = kind(Matrix.says, base=Matrix, read=by("turn_of_matrix"))  # the axes of a frame as columns
 
