@@ -225,20 +225,16 @@ def euler_angles(graph: Graph, sequence: str, rotation: Mat3) -> list[Expr]:
     of the two alone loses half the digits.
     """
     i, j, k = (AXES[letter] for letter in sequence)
+    other, sign = 3 - i - j, 1.0 if (j - i) % 3 == 1 else -1.0
     if i != k:
-        sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
         upper, lower = rotation[j][k], rotation[k][k]
         first = atan2(-sign * upper, lower)
         second = atan2(sign * rotation[i][k], sqrt(upper * upper + lower * lower))
-        third = atan2(-sign * rotation[i][j], rotation[i][i])
-        return [first, second, third]
-    other = 3 - i - j
-    sign = 1.0 if (i, j, other) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
+        return [first, second, atan2(-sign * rotation[i][j], rotation[i][i])]
     upper, lower = rotation[j][i], rotation[other][i]
     first = atan2(upper, -sign * lower)
     second = atan2(sqrt(upper * upper + lower * lower), rotation[i][i])
-    third = atan2(rotation[i][j], sign * rotation[i][other])
-    return [first, second, third]
+    return [first, second, atan2(rotation[i][j], sign * rotation[i][other])]
 
 
 def parameter_rotation(graph: Graph, e: Sequence[Expr]) -> Mat3:

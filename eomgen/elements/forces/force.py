@@ -78,6 +78,13 @@ class CoordinateLoad(NamedTuple):
 Load = MarkerLoad | CoordinateLoad
 
 
+def with_reaction(view: View, marker: Marker, base: Marker, force: Vec3, torque: Vec3) -> list[Load]:
+    """A wrench at a marker, and the opposite wrench on the body of another one."""
+    reach = vec.sub(view.position(marker), view.position(base))
+    back = vec.neg(vec.add(torque, vec.cross(reach, force)))
+    return [MarkerLoad(marker, force, torque), MarkerLoad(base, vec.neg(force), back)]
+
+
 def power_of(view: View, loads: Sequence[Load]) -> Expr:
     """Power of loads (W)."""
     total = view.graph.zero

@@ -30,7 +30,7 @@ from ..glyphs import (
 )
 from ..kinds import LAW, BodyName, Choice, Fields, MarkerReference, Matrix6, Scalar, Value, Vector
 from ..scalars import dot
-from .force import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, View, with_reaction
 from .paths import (
     ANGLE,
     ANYWHERE,
@@ -443,9 +443,7 @@ class Bushing(Force):
         axes = view.rotation(self.first)
         push = vec.times(axes, force)
         turn = vec.times(axes, vec.add(vec.scale(e0, moments), vec.cross(e, moments)))
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        back = vec.neg(vec.add(turn, vec.cross(reach, push)))
-        return [MarkerLoad(self.second, push, turn), MarkerLoad(self.first, vec.neg(push), back)]
+        return with_reaction(view, self.second, self.first, push, turn)
 
 
 def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
@@ -504,10 +502,10 @@ class PointGravity(Force):
     mass: Expr
     inertia: Mat3 | None = None
 
-    def _reach(self, view: View) -> tuple[Vec3, Expr, Vec3]:
+    def _reach(self, view: View) -> tuple[Expr, Vec3]:
         d = vec.sub(view.position(self.body), view.position(self.center))
         r = sqrt(vec.dot(d, d))
-        return d, r, (d[0] / r, d[1] / r, d[2] / r)
+        return r, (d[0] / r, d[1] / r, d[2] / r)
 
     def _second(self, view: View, u: Vec3) -> tuple[Vec3, Expr, Expr]:
         """I u in ground axes, u . I u, tr I."""
@@ -517,19 +515,18 @@ class PointGravity(Force):
         return bent, vec.dot(u, bent), self.inertia[0][0] + self.inertia[1][1] + self.inertia[2][2]
 
     def loads(self, view: View) -> list[Load]:
-        d, r, u = self._reach(view)
-        force = vec.scale(-self.mu * self.mass / (r * r), u)
-        torque = back = vec.zero(view.graph)
-        if self.inertia is not None:
-            bent, along, trace = self._second(view, u)
-            extra = vec.add(vec.scale(trace - 5.0 * along, u), vec.scale(view.graph.lift(2.0), bent))
-            force = vec.sub(force, vec.scale(1.5 * self.mu / r**4, extra))
-            torque = vec.scale(3.0 * self.mu / r**3, vec.cross(u, bent))
-            back = vec.neg(vec.add(torque, vec.cross(d, force)))  # the pair has no resultant moment
-        return [MarkerLoad(self.body, force, torque), MarkerLoad(self.center, vec.neg(force), back)]
+        r, u = self._reach(view)
+        force, o = vec.scale(-self.mu * self.mass / (r * r), u), vec.zero(view.graph)
+        if self.inertia is None:
+            return [MarkerLoad(self.body, force, o), MarkerLoad(self.center, vec.neg(force), o)]
+        bent, along, trace = self._second(view, u)
+        extra = vec.add(vec.scale(trace - 5.0 * along, u), vec.scale(view.graph.lift(2.0), bent))
+        force = vec.sub(force, vec.scale(1.5 * self.mu / r**4, extra))
+        torque = vec.scale(3.0 * self.mu / r**3, vec.cross(u, bent))
+        return with_reaction(view, self.body, self.center, force, torque)
 
     def potential(self, view: View) -> Expr | None:
-        _, r, u = self._reach(view)
+        r, u = self._reach(view)
         energy = -self.mu * self.mass / r
         if self.inertia is not None:
             _, along, trace = self._second(view, u)

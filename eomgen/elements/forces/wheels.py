@@ -18,7 +18,7 @@ from ..element_type import Entry, Where, element, key, keys_of, table
 from ..frames import Marker, velocity_at
 from ..glyphs import PLANE, Drawn, Glyph, Wheel
 from ..kinds import LAW, Axis, Choice, Flag, Pair, Radii, Scalar
-from .force import Force, Load, MarkerLoad, Measured, View, beyond_zero, where
+from .force import Force, Load, MarkerLoad, Measured, View, beyond_zero, where, with_reaction
 from .normal_laws import DampedLinear
 
 LAWS = ("linear", "vermeulen_johnson", "polach")
@@ -525,11 +525,7 @@ class Tyre(Force):
         turn = vec.add(vec.scale(moment, way.normal), vec.scale(lag / way.upright, way.across))
         force = vec.add(pressing, sliding)
         torque = vec.add(vec.add(vec.cross(way.lowest, pressing), vec.cross(way.patch, sliding)), turn)
-        reach = vec.sub(view.position(self.wheel), view.position(self.road))
-        return [
-            MarkerLoad(self.wheel, force, torque),
-            MarkerLoad(self.road, vec.neg(force), vec.neg(vec.add(torque, vec.cross(reach, force)))),
-        ]
+        return with_reaction(view, self.wheel, self.road, force, torque)
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         way, graph = self._rolling(view), view.graph
