@@ -315,7 +315,7 @@ def element(
     where: Where = NOWHERE,
     keys: Fields | None = None,
     more: Mapping[str, Field] = {},
-    check: Callable[[Entry, dict[str, Any]], None] = lambda e, values: None,
+    check: Callable[[Entry, dict[str, Any]], object] = lambda e, values: None,
     **rest: Any,
 ) -> ElementType:
     """The type of elements or laws whose fields are read from their keys one by one, in this order.

@@ -84,8 +84,6 @@ def define(name: str, schema: Schema | Callable[[], Schema]) -> tuple[Schema, di
 
 
 _TEXT: Schema = {"type": "string"}
-_FLAG: Schema = {"type": "boolean"}
-_WHOLE: Schema = {"type": "integer", "minimum": 1}
 _NUMBER: Schema = {"type": ["number", "string"]}
 
 
@@ -316,7 +314,7 @@ class Choice(Field):
         return reader.choice(path, value, self)
 
 
-Flag = kind("True or false.", _FLAG, "bool", "bool", read=by("flag"))
+Flag = kind("True or false.", {"type": "boolean"}, "bool", "bool", read=by("flag"))
 Check = kind(
     "True or false, error, note or off.",
     enum(True, False, *CHECKS),
@@ -377,7 +375,7 @@ class PositiveNumber(Number):
         return result
 
 
-Count = kind("A whole number greater than 0.", _WHOLE)
+Count = kind("A whole number greater than 0.", {"type": "integer", "minimum": 1})
 
 
 class Numbers(Field):
@@ -706,19 +704,14 @@ class Via(Field):
         reader.check_keys(path, value, CYLINDER)
         if "around" not in value or "radius" not in value:
             return None
-        keys = ("around", "radius", "sense", *self._rubbing(reader, path, value))
-        made = [CYLINDER[key].read(reader, f"{path}.{key}", value.get(key, CYLINDER[key].default)) for key in keys]
-        marker, radius, sense, *rubbing = made
-        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1, *rubbing)
-
-    @staticmethod
-    def _rubbing(reader: Any, path: str, value: Mapping[str, Any]) -> tuple[str, ...]:
-        """Friction of a rope on a cylinder, and the velocity below which it is smoothed; neither where it is smooth."""
-        keys = ("friction", "smoothing")
-        missing = [key for key in keys if key not in value]
+        rubbing = ("friction", "smoothing")  # neither where it is smooth
+        missing = [key for key in rubbing if key not in value]
         if len(missing) == 1:
             reader.faults.missing(f"{path}.{missing[0]}", "give friction and smoothing together, or neither")
-        return () if missing else keys
+        keys = ("around", "radius", "sense", *(() if missing else rubbing))
+        made = [CYLINDER[key].read(reader, f"{path}.{key}", value.get(key, CYLINDER[key].default)) for key in keys]
+        marker, radius, sense, *rest = made
+        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1, *rest)
 
     def reference(self, value: Any, refer: Any) -> Any:
         return [self._refer(stop, refer) for stop in value] or None

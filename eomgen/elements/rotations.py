@@ -340,7 +340,7 @@ def rate_matrix(kind: str, values: Any, axes: str = "body", sequence: str = "xyz
     first, second, _ = _coefficients(near)
     series = (1 + square / 60 + square * square / 2520 + square * square * square / 100800) / 12
     factor = where_less(square, NEAR, series, (1 - first / (2 * second)) / near)
-    return shaped(combine(1 - factor * square, -sign * _half(square), factor, v))
+    return shaped(combine(1 - factor * square, -sign * ((square * 0 + 1) / 2), factor, v))
 
 
 def angular_velocity(kind: str, values: Any, rates: Any, axes: str = "body", sequence: str = "xyz") -> Any:
@@ -349,10 +349,6 @@ def angular_velocity(kind: str, values: Any, rates: Any, axes: str = "body", seq
     listed = matrix.tolist() if hasattr(matrix, "tolist") else matrix
     raw = entries(rates, len(listed[0]), "rates")
     return shaped([dot(row, raw) for row in listed])
-
-
-def _half(like: Scalar) -> Scalar:
-    return (like * 0 + 1) / 2  # exact in symbols
 
 
 def _sign(axes: str) -> int:

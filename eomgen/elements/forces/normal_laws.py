@@ -262,10 +262,6 @@ def _dissipation(e: Entry, value: Expr | None) -> Expr:
     return dissipation_of(restitution, velocity, formula) if known else e.graph.zero
 
 
-def _check_dissipation(e: Entry, values: dict[str, Any]) -> None:
-    values["dissipation"] = _dissipation(e, values["dissipation"])
-
-
 def _hertz(e: Entry) -> HuntCrossley | None:
     """Of a stiffness, or of the moduli of both bodies."""
     exponent, dissipation = e.graph.constant(EXPONENT), _dissipation(e, e["dissipation"])
@@ -300,7 +296,7 @@ _LAWS = table(
         "hunt_crossley",
         "k d**n max(0, 1 + dissipation d_dot) of the penetration d.",
         more=IMPACT,
-        check=_check_dissipation,
+        check=lambda e, values: values.update(dissipation=_dissipation(e, values["dissipation"])),
         remedies=_REMEDIES,
     ),
     _hertz_law({}),

@@ -54,7 +54,8 @@ class Line(Path):
         """From start to end, ground axes (m)."""
         return vec.sub(view.position(self.end), view.position(self.start))
 
-    def _geometry(self, view: View) -> tuple[Vec3, Expr]:
+    def geometry(self, view: View) -> tuple[Vec3, Expr]:
+        """The unit vector from start to end, ground axes, and the distance."""
         d = self.reach(view)
         length = sqrt(vec.dot(d, d))
         return (d[0] / length, d[1] / length, d[2] / length), length
@@ -63,12 +64,12 @@ class Line(Path):
         return Drawn((self.start, self.end), along=along)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        direction, length = self._geometry(view)
+        direction, length = self.geometry(view)
         relative = vec.sub(view.velocity(self.end), view.velocity(self.start))
         return length, vec.dot(direction, relative)
 
     def loads(self, view: View, force: Expr) -> list[Load]:
-        direction, _ = self._geometry(view)
+        direction, _ = self.geometry(view)
         return self.pair(view, vec.scale(force, direction))
 
     def pair(self, view: View, push: Vec3) -> list[Load]:
@@ -269,9 +270,7 @@ def _scaled(force: Expr, loads: Sequence[MarkerLoad]) -> list[MarkerLoad]:
 
 
 def _straight(view: View, start: Marker, end: Marker) -> Piece:
-    reach = Line(start, end).reach(view)
-    length = sqrt(vec.dot(reach, reach))
-    direction = (reach[0] / length, reach[1] / length, reach[2] / length)
+    direction, length = Line(start, end).geometry(view)
     o = vec.zero(view.graph)
     return Piece(length, direction, direction, o, o, (o, o), view.graph.zero)
 

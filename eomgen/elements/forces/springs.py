@@ -502,11 +502,6 @@ class PointGravity(Force):
     mass: Expr
     inertia: Mat3 | None = None
 
-    def _reach(self, view: View) -> tuple[Expr, Vec3]:
-        d = vec.sub(view.position(self.body), view.position(self.center))
-        r = sqrt(vec.dot(d, d))
-        return r, (d[0] / r, d[1] / r, d[2] / r)
-
     def _second(self, view: View, u: Vec3) -> tuple[Vec3, Expr, Expr]:
         """I u in ground axes, u . I u, tr I."""
         assert self.inertia is not None
@@ -515,7 +510,7 @@ class PointGravity(Force):
         return bent, vec.dot(u, bent), self.inertia[0][0] + self.inertia[1][1] + self.inertia[2][2]
 
     def loads(self, view: View) -> list[Load]:
-        r, u = self._reach(view)
+        u, r = Line(self.center, self.body).geometry(view)
         force, o = vec.scale(-self.mu * self.mass / (r * r), u), vec.zero(view.graph)
         if self.inertia is None:
             return [MarkerLoad(self.body, force, o), MarkerLoad(self.center, vec.neg(force), o)]
@@ -526,7 +521,7 @@ class PointGravity(Force):
         return with_reaction(view, self.body, self.center, force, torque)
 
     def potential(self, view: View) -> Expr | None:
-        r, u = self._reach(view)
+        u, r = Line(self.center, self.body).geometry(view)
         energy = -self.mu * self.mass / r
         if self.inertia is not None:
             _, along, trace = self._second(view, u)

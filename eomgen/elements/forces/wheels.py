@@ -492,15 +492,17 @@ class Tyre(Force):
             vec.dot(lateral, velocity),
         )
 
-    def _slips(self, way: _WheelMotion) -> tuple[Expr, Expr]:
-        """Longitudinal slip and tangent of the slip angle of the law."""
-        speed, (x, y), (u, v) = way.depth.graph.apply("abs", way.forward), self.relaxation, self.deflections
+    def _slips(self, way: _WheelMotion) -> Slips:
+        """Those of the law."""
+        graph = way.depth.graph
+        speed, (x, y), (u, v) = graph.apply("abs", way.forward), self.relaxation, self.deflections
 
         def slip(deflection: Expr, velocity: Expr, length: Expr) -> Expr:
             tau = self.settling / (1.0 + speed * self.settling / length)
             return (deflection + tau * velocity) / length
 
-        return slip(u, way.forward - way.rolling, x), slip(v, way.sideways, y)
+        along, across = slip(u, way.forward - way.rolling, x), slip(v, way.sideways, y)
+        return Slips(along, across, way.camber, graph.apply("tanh", way.forward / self.reversal))
 
     def loads(self, view: View) -> list[Load]:
         return self._loads(view, True)
@@ -515,7 +517,7 @@ class Tyre(Force):
         way = self._rolling(view)
         load = self.load_law.force(way.depth, way.rate)
         push = load if whole else load - self.load_law.elastic(way.depth)
-        slips = Slips(*self._slips(way), way.camber, view.graph.apply("tanh", way.forward / self.reversal))
+        slips = self._slips(way)
         bears = view.graph.apply("lt", 0.0, load)
         result = self.law.forces(slips, where(bears, load, 1.0))
         along, lateral, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in result))
@@ -535,26 +537,24 @@ class Tyre(Force):
         bears = graph.apply("lt", 0.0, load)
         off = speed + graph.apply("abs", way.rolling)
         slips = self._slips(way)
-        moved = [v - speed * slip for v, slip in zip((way.forward - way.rolling, way.sideways), slips, strict=True)]
-        turned = Slips(*slips, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        moved = way.forward - way.rolling - speed * slips.along, way.sideways - speed * slips.across
         vertical = where(bears, load, 1.0)
-        slides = self.law.slides(turned, vertical)
-        taken = self._shares(way, vertical)
-        rates, unwound = taken(*moved), taken(*slips)
-        growth = slips[0] * rates[0] / x + slips[1] * rates[1] / y
-        weight = slips[0] * unwound[0] / x + slips[1] * unwound[1] / y
+        slides = self.law.slides(slips, vertical)
+        taken = self._shares(slips, vertical)
+        rates, unwound = taken(*moved), taken(slips.along, slips.across)
+        growth = slips.along * rates[0] / x + slips.across * rates[1] / y
+        weight = slips.along * unwound[0] / x + slips.across * unwound[1] / y
         grows = where(graph.apply("lt", 0.0, weight), graph.apply("lt", 0.0, growth), 0.0)
         lost = where(slides, where(grows, growth / where(grows, weight, 1.0), 0.0), 0.0)
-        result = [
+        return tuple(
             where(bears, rate - lost * back, -off / length * deflection)
             for rate, back, deflection, length in zip(rates, unwound, (u, v), (x, y), strict=True)
-        ]
-        return tuple(result)
+        )
 
-    def _shares(self, way: _WheelMotion, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
+    def _shares(self, slips: Slips, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
         """Rates of the deflections of the motion that the tyre takes up: of a tread beside the rest of a carcass."""
         (u, v), (x, y), graph = self.deflections, self.relaxation, load.graph
-        limited = Slips(u / x, v / y, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        limited = slips._replace(along=u / x, across=v / y)
         result = None if (y - x).is_zero else self.law.gradients(limited, load)
         if result is None:
             return lambda along, across: (along, across)
