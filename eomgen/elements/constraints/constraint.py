@@ -158,9 +158,7 @@ class Linear(Constraint):
     kind: str
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
-        total = -self.offset
-        for coordinate, factor in self.terms:
-            total = total + factor * coordinate
+        total = sum((factor * coordinate for coordinate, factor in self.terms), -self.offset)
         return [Condition("relation", total, self.kind)]
 
 

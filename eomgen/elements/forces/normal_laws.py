@@ -345,10 +345,7 @@ class JointStop(PathForce):
 
     def _sum(self, value: Expr, rate: Expr, part: Callable[[Expr, Expr, float], Expr]) -> Expr:
         """A part of what the law gives, of both stops."""
-        total = value.graph.zero
-        for one in self._depths(value, rate):
-            total = total + part(*one)
-        return total
+        return sum((part(*one) for one in self._depths(value, rate)), value.graph.zero)
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self._sum(value, rate, lambda depth, change, sense: sense * self.law.force(depth, change))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -91,8 +92,7 @@ class Turn(Path):
         return Drawn((self.start,), about=about)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        angle, rate, _ = view.turn(self.start, self.end)
-        return angle, rate
+        return view.turn(self.start, self.end)[:2]
 
     def is_exact(self, view: View) -> bool:
         return view.turn(self.start, self.end)[2]
@@ -161,9 +161,6 @@ class PathForce(Force):
 # -- paths over via points and cylinders -------------------------------------------------------------------------------
 
 
-PI = 3.141592653589793
-
-
 class Piece(NamedTuple):
     """A piece of a path between two markers: its length, and the directions in which it leaves and arrives.
 
@@ -201,9 +198,7 @@ class Route(Path):
         return Drawn((self.start, *self.via, self.end))
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        length = view.graph.zero
-        for _, _, _, piece in self._pieces(view):
-            length = length + piece.length
+        length = sum((piece.length for _, _, _, piece in self._pieces(view)), view.graph.zero)
         return length, power_of(view, self._smooth(view, view.graph.one))  # of a unit force: the rate
 
     def is_exact(self, view: View) -> bool:
@@ -290,7 +285,7 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
     # angle from start to end about the axis in the sense of the path, 0 to 2 pi, less those from the ends to where the
     # tangents touch
     cross, dot = s * (a[0] * b[1] - a[1] * b[0]), a[0] * b[0] + a[1] * b[1]
-    w = PI + atan2(-cross, -dot) - atan2(t_a, r) - atan2(t_b, r)
+    w = math.pi + atan2(-cross, -dot) - atan2(t_a, r) - atan2(t_b, r)
     arc = t_a + r * w + t_b
     h = b[2] - a[2]
     length = sqrt(arc * arc + h * h)

@@ -257,9 +257,6 @@ class GeneralElement(PathForce):
     law: Expr
     energy: Expr
 
-    def _here(self, view: View, expression: Expr) -> Expr:
-        return self._at(*self.path.measure(view), expression)
-
     def _at(self, value: Expr, rate: Expr, expression: Expr) -> Expr:
         return substitute([expression], {self.value: value, self.rate: rate})[0]
 
@@ -273,10 +270,10 @@ class GeneralElement(PathForce):
     def potential(self, view: View) -> Expr | None:
         if self.energy.is_zero or not self.path.is_exact(view):
             return None
-        return self._here(view, self.energy)
+        return self._at(*self.path.measure(view), self.energy)
 
     def remainder(self, view: View) -> list[Load]:
-        return [] if self.law.is_zero else self.path.loads(view, self._here(view, self.law))
+        return [] if self.law.is_zero else self.path.loads(view, self._at(*self.path.measure(view), self.law))
 
 
 def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], GeneralElement | None]:
@@ -387,10 +384,7 @@ class Bushing(Force):
 
     def potential(self, view: View) -> Expr | None:
         y = self._displacements(view)
-        total = view.graph.zero
-        for a, b in zip(y, _times(self.stiffness, y), strict=True):
-            total = total + a * b
-        return 0.5 * total
+        return 0.5 * dot(y, _times(self.stiffness, y))  # type: ignore[no-any-return]
 
     def remainder(self, view: View) -> list[Load]:
         if all(entry.is_zero for row in self.damping for entry in row):
