@@ -26,8 +26,11 @@ SHARPNESS = 10.0  #: with which activation changes to deactivation
 
 def active_force_length(length: Expr) -> Expr:
     """Active force over fibre length, both normalised: three bells exp(-((l - b2) / (b3 + b4 l))^2 / 2)."""
-    bells = ((height, (length - middle) / (width + slope * length)) for height, middle, width, slope in _ACTIVE)
-    return sum((height * length.graph.apply("exp", -0.5 * (x * x)) for height, x in bells), length.graph.zero)
+    total = length.graph.zero
+    for height, middle, width, slope in _ACTIVE:
+        x = (length - middle) / (width + slope * length)
+        total = total + height * length.graph.apply("exp", -0.5 * (x * x))
+    return total
 
 
 def passive_force_length(length: Expr) -> Expr:
