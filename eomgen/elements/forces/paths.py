@@ -15,7 +15,7 @@ from ..element_type import Entry, Where
 from ..frames import Marker, WrapCylinder
 from ..glyphs import Drawn, Points
 from ..kinds import JointReference, Pair, Via
-from .force import CoordinateLoad, Force, Load, MarkerLoad, View, power_of, where
+from .force import CoordinateLoad, Force, Load, MarkerLoad, Measured, View, power_of, where
 
 # -- paths -------------------------------------------------------------------------------------------------------------
 
@@ -151,6 +151,16 @@ class PathForce(Force):
     """A force along a path: :meth:`along` says how large it is at a value and a rate of the path."""
 
     path: Path
+    acts_along = True
+
+    def along(self, value: Expr, rate: Expr) -> Expr | None:
+        """The force along its path at a value and a rate of it."""
+        return self.push(value, rate)
+
+    def measured(self, view: View) -> Measured | None:
+        value, rate = self.path.measure(view)
+        force = self.along(value, rate)
+        return None if force is None else Measured(value, rate, force)
 
     def loads(self, view: View) -> list[Load]:
         value, rate = self.path.measure(view)

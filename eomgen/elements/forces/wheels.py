@@ -433,6 +433,7 @@ class Tyre(Force):
         )
     )  # fmt: skip
     deflections: tuple[Expr, ...] = ()
+    acts_along = True
 
     @property
     def load_law(self) -> DampedLinear:
@@ -442,10 +443,6 @@ class Tyre(Force):
     @property
     def laws(self) -> tuple[Any, ...]:
         return (self.load_law, self.law)
-
-    @property
-    def acts_along(self) -> bool:
-        return True
 
     def glyphs(self) -> list[Glyph]:
         return [Drawn((self.road,), about=PLANE), Wheel(self.wheel, self.radius)]
