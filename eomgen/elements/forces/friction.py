@@ -470,8 +470,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if "smoothing" not in e.values:
         e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
-    raw = [e[one] for one in ("coefficient", "static_coefficient", "coulomb", "static")]
-    coefficient, onset, preload, breakaway = raw
+    coefficient, onset, preload, breakaway = (e[x] for x in ("coefficient", "static_coefficient", "coulomb", "static"))
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
         message = "is missing" if "stribeck" not in e.values else "is given without static_coefficient or static"
         remedy = "give stribeck together with static_coefficient or static, or none of them"
@@ -530,7 +529,7 @@ class JointFriction(PathForce):
 
 #: Keys of laws of friction -> those of friction in a joint, which are forces or torques.
 _IN_JOINT = {
-    **dict.fromkeys(("static", "stribeck", "smoothing", "viscous", "transition")),
+    **{key: key for key in ("static", "stribeck", "smoothing", "viscous", "transition")},
     "type": "friction_law",
     "dynamic": "coulomb",
     "stiffness": "bristle_stiffness",
@@ -545,13 +544,12 @@ def _joint_friction(e: Entry) -> Force | None:
     for one in BY_REACTION:
         if one in e.values:
             e.fault(one, "is given without coefficient", f"give coefficient, or leave {one} out", "EG-MISSING")
-    names = {key: name or key for key, name in _IN_JOINT.items()}
-    values = {key: e.values[name] for key, name in names.items() if name in e.values}
+    values = {key: e.values[name] for key, name in _IN_JOINT.items() if name in e.values}
     if "coulomb" not in e.values:
-        for one in [names[key] for key in values if key != "viscous"]:
+        for one in [_IN_JOINT[key] for key in values if key != "viscous"]:
             e.fault(one, "is given without coulomb", f"give coulomb, or leave {one} out", "EG-MISSING")
     else:
-        law = e.as_law(FRICTION, e["friction_law"], values, e.path, names)
+        law = e.as_law(FRICTION, e["friction_law"], values, e.path, _IN_JOINT)
         dry = law.element_type.read(law)
         return None if path is None or dry is None else JointFriction(e.name, path, dry)
     if viscous is None and not e.at_fault():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
@@ -28,24 +28,10 @@ from ..glyphs import (
     Glyph,
     Pull,
 )
-from ..kinds import LAW, BodyName, Choice, Fields, MarkerReference, Matrix6, Scalar, Value, Vector
+from ..kinds import LAW, BodyName, Choice, MarkerReference, Matrix6, Scalar, Value, Vector
 from ..scalars import dot
 from .force import Force, Load, MarkerLoad, View, with_reaction
-from .paths import (
-    ANGLE,
-    ANYWHERE,
-    BETWEEN,
-    COORDINATE,
-    LINE,
-    ON_JOINT,
-    VIA,
-    Line,
-    Path,
-    PathForce,
-    read_angle,
-    read_coordinate,
-    read_joint_or_path,
-)
+from .paths import ANGLE, ANYWHERE, BETWEEN, COORDINATE, LINE, ON_JOINT, Line, PathForce, read_coordinate
 
 
 class Actuator(PathForce):
@@ -276,28 +262,23 @@ class GeneralElement(PathForce):
         return [] if self.law.is_zero else self.path.loads(view, self._at(*self.path.measure(view), self.law))
 
 
-def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], GeneralElement | None]:
-    """The law knows ``length`` or ``angle``, and ``rate``."""
+def _element(name: str, doc: str, where: Where, of: str, unit: str, push: Dimension, rate: Dimension) -> ElementType:
+    """A type whose law knows ``length`` or ``angle``, and ``rate``: of what, in what unit, and the dimensions."""
 
     def read(e: Entry) -> GeneralElement | None:
-        where = path(e)
+        path = where.read(e)
         if "law" not in e.values and "potential" not in e.values:
             e.fault("", "has no force law", "give law, potential or both", "EG-MISSING")
-        on = e["joint"] if "joint" in e.values and where is not None else None
-        word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
-        value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
-        law = e.law("law", {word: value, "rate": rate}) if "law" in e.values else e.graph.zero
-        energy = e.law("potential", {word: value}) if "potential" in e.values else e.graph.zero
-        return None if where is None else GeneralElement(e.name, where, value, rate, law, energy)
+        on = e["joint"] if "joint" in e.values and path is not None else None
+        word = "angle" if where is ANGLE or (on is not None and on.kind == "angle") else "length"
+        s, s_dot = (e.graph.symbol(f"{one}[{e.name}]") for one in (word, "rate"))
+        law = e.law("law", {word: s, "rate": s_dot}) if "law" in e.values else e.graph.zero
+        energy = e.law("potential", {word: s}) if "potential" in e.values else e.graph.zero
+        return None if path is None else GeneralElement(e.name, path, s, s_dot, law, energy)
 
-    return read
-
-
-def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
-    """Keys of a law of ``of``, its dimension and that of ``rate``."""
     local = {"length": LENGTH, "angle": NONE, "rate": rate}
     names = {name: Scalar("", dimension=dimension) for name, dimension in local.items()}
-    return {
+    keys = {
         "law": Scalar(
             f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
             "``rate``, t, parameters, inputs, coordinates, velocities, the motion of markers and outputs",
@@ -311,27 +292,21 @@ def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
             local=names,
         ),
     }
+    return ElementType(name, doc, {**where.keys, **keys, **where.behind}, read, one_of=where.one_of)
 
 
 TYPES |= table(
-    ElementType(
+    _element(
         "element",
         "a force with a law of your own: along a joint's coordinate, the line between two markers, or a path.",
-        {
-            "joint": ON_JOINT,
-            "between": BETWEEN,
-            **_law("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)", PUSH, RATE),
-            "via": VIA,
-        },
-        _element(read_joint_or_path, False),
-        one_of=("joint", "between"),
+        ANYWHERE,
+        *("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)", PUSH, RATE),
     ),
-    ElementType(
+    _element(
         "torsional_element",
         "a torque with a law of your own on an angle: of a joint, or of the second marker about z of the first.",
-        {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)", ENERGY, SPIN)},
-        _element(read_angle, True),
-        one_of=("joint", "between"),
+        ANGLE,
+        *("``angle``", "torque (N m)", ENERGY, SPIN),
     ),
 )
 
