@@ -515,24 +515,19 @@ class RotatingJoint(PoseJoint):
     rotation: str = key(ROTATION)
 
     def __post_init__(self) -> None:
-        if self.in_parameters:
+        if self.rotation == "euler_parameters":
             lengths = self.coordinates[:-3]
             object.__setattr__(self, "coordinates", (*lengths, *PARAMETERS))
             object.__setattr__(self, "quaternion_slots", (QuaternionSlot(len(lengths), len(lengths)),))
 
-    @property
-    def in_parameters(self) -> bool:
-        """Whether the rotation is described by Euler parameters."""
-        return self.rotation == "euler_parameters"
-
     def turn(self, graph: Graph, angles: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
         """Of Euler parameters the columns are constant."""
-        if self.in_parameters:
+        if self.quaternion_slots:
             return parameter_rotation(graph, angles), [*vec.identity(graph)]
         return super().turn(graph, angles)
 
     def measure_turn(self, graph: Graph, rotation: Mat3) -> list[Expr]:
-        if self.in_parameters:
+        if self.quaternion_slots:
             return [*euler_parameters_from_matrix(rotation)]
         return euler_angles(graph, self.sequence, rotation)
 
@@ -610,11 +605,10 @@ class Guide(PoseJoint):
         x, y, z = substitute(list(point), dict(zip(parameters, q[: len(parameters)], strict=True)))
         return (x, y, z)
 
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> Any:
         raise TypeError(f"a {self.type_name} joint cannot be cut")
 
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        raise TypeError(f"a {self.type_name} joint cannot be cut")
+    measure = closure
 
 
 class CurveSlider(Guide):
@@ -694,11 +688,10 @@ class RodJoint(Joint):
     def allows(self) -> int:
         return 6 - self.removes
 
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> Any:
         raise TypeError(f"a {self.type_name} joint cannot be in the tree")
 
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        raise TypeError(f"a {self.type_name} joint cannot be in the tree")
+    subspace = pose
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         return []
