@@ -185,10 +185,6 @@ class Entry:
         """The symbol of a coordinate."""
         return self.graph.symbol(quantity.name)
 
-    def known(self, kind: str) -> list[str]:
-        """The model's names of a kind."""
-        return [*self.reader.names.of(kind)]
-
     def states(self) -> tuple[Expr, ...]:
         """The symbols of its own first-order states, in the order in which its type names them."""
         if self.owner is not self:

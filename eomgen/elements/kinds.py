@@ -631,13 +631,10 @@ class Markers(Field):
     def map(self, value: Any, visitor: Any) -> Any:
         pairs = value.items() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
         try:
-            return {name: self._placed(placed, visitor) for name, placed in pairs}
+            every = [(name, placed if isinstance(placed, Mapping) else {"at": placed}) for name, placed in pairs]
+            return {name: visitor.placement(visitor.entry.name, placed) for name, placed in every}
         except (TypeError, ValueError):  # no pairs, or names that are no names
             return value
-
-    @staticmethod
-    def _placed(placed: Any, visitor: Any) -> Any:
-        return visitor.placement(visitor.entry.name, placed if isinstance(placed, Mapping) else {"at": placed})
 
 
 class MarkerReference(Field):

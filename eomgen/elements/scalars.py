@@ -51,19 +51,14 @@ def where_less(a: Scalar, b: Scalar, yes: Scalar, no: Scalar) -> Scalar:
 sin, cos, sqrt, atan2 = (partial(apply, name) for name in ("sin", "cos", "sqrt", "atan2"))
 
 
-def quarter_turns(angle: float, snap: float = 0.0) -> tuple[float, float] | None:
-    """Exact cosine and sine of an angle (rad) within ``snap``, or rounding, of a multiple of pi/2; None of others."""
-    quarter = round(angle / (math.pi / 2))
-    if abs(angle - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-    return None
-
-
 def cosine_and_sine(angle: Scalar, snap: float = 0.0) -> tuple[Scalar, Scalar]:
     """cos and sin; exact 0 and +-1 for numbers within ``snap``, or rounding, of multiples of pi/2."""
     value = angle.value if isinstance(angle, Expr) else angle
-    exact = quarter_turns(value, snap) if isinstance(value, int | float) else None
-    return exact or (cos(angle), sin(angle))
+    if isinstance(value, int | float):
+        quarter = round(value / (math.pi / 2))
+        if abs(value - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
+            return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    return cos(angle), sin(angle)
 
 
 def about(axis: int, c: Scalar, s: Scalar) -> list[list[Scalar]]:
