@@ -199,7 +199,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     starts = [*c.aligned, *loop.values, *loop.rates, kinematics.length_scale, *row_scales(kinematics)]
     starts += [*m.defaults.initial.values(), *m.defaults.initial_outputs.values(), *m.defaults.guess.values()]
     names_of_start = used | symbols_of(starts)
-    shapes = [[force.name, shape] for force in m.forces for shape in force.met_shapes()]
+    shapes = [[force.name, shape] for force in m.forces for shape, _ in force.met_shapes()]
     independent = [*independent_places(kinematics, mobility), *range(n, n + len(states))]
     return {
         "name": m.name,

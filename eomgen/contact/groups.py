@@ -196,9 +196,9 @@ class ContactGroups(Force):
         never = all(never_reached(hollow, sizes, radius) for sizes, radius in pairs)
         return not never and not self.normal_law.elastic(other[0].feature.sizes[0].graph.one).is_zero
 
-    def met_shapes(self) -> list[str]:
+    def met_shapes(self) -> list[tuple[str, int]]:
         parts = [one.shape for group in self._groups() for features in group.values() for one in features]
-        return [f"{shape.kind} on {shape.marker.label}" for shape in parts]
+        return [(f"{shape.kind} on {shape.marker.label}", shape.marker.body) for shape in parts]
 
     def meeting(self, view: MovingView) -> list[Expr]:
         markers, function, operands = self._operands(view, "")
@@ -211,11 +211,7 @@ class ContactGroups(Force):
         return pair_witnesses(view.graph, function, operands)
 
     @property
-    def met_bodies(self) -> list[int]:
-        return [one.shape.marker.body for group in self._groups() for features in group.values() for one in features]
-
-    @property
-    def is_rigid(self) -> bool:
+    def is_rigid(self) -> bool:  # type: ignore[override]
         return isinstance(self.normal_law, RigidLaw)
 
     def _results(self, view: View, part: str, still: bool = False) -> tuple[list[Marker], list[Expr]]:

@@ -43,6 +43,7 @@ class Contact(Force):
         "Contact at one point: a force along the normal from the penetration $d$ and its rate, and friction "
         "against the sliding."
     )
+    acts_along = True
     first: Marker
     second: Marker
     normal_law: NormalLaw
@@ -131,10 +132,6 @@ class Contact(Force):
         """Rates of its states where the surfaces are apart; those of friction come first."""
         friction = () if self.friction is None else self.friction.rates_apart()
         return (*friction, *self.normal_law.rates_apart())
-
-    @property
-    def acts_along(self) -> bool:
-        return True
 
     def measured(self, view: View) -> Measured:
         _, depth, _, _, rate = self._motion(view)

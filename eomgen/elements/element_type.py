@@ -185,10 +185,6 @@ class Entry:
         """The symbol of a coordinate."""
         return self.graph.symbol(quantity.name)
 
-    def known(self, kind: str) -> list[str]:
-        """The model's names of a kind."""
-        return [*self.reader.names.of(kind)]
-
     def states(self) -> tuple[Expr, ...]:
         """The symbols of its own first-order states, in the order in which its type names them."""
         if self.owner is not self:
@@ -315,7 +311,7 @@ def element(
     where: Where = NOWHERE,
     keys: Fields | None = None,
     more: Mapping[str, Field] = {},
-    check: Callable[[Entry, dict[str, Any]], None] = lambda e, values: None,
+    check: Callable[[Entry, dict[str, Any]], object] = lambda e, values: None,
     **rest: Any,
 ) -> ElementType:
     """The type of elements or laws whose fields are read from their keys one by one, in this order.

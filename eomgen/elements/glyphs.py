@@ -117,9 +117,10 @@ class LiftCurve(NamedTuple):
 Glyph = Drawn | Pull | Wheel | PitchCircles | Contour | RackAndPinion | LiftCurve
 
 
-def _arc(radius: float, start: float, end: float, steps: int) -> Points:
-    turns = [math.radians(start + (end - start) * k / steps) for k in range(steps + 1)]
-    return tuple((round(radius * math.cos(a), 3), round(radius * math.sin(a), 3)) for a in turns)
+def _arc(radius: float, start: float, end: float, steps: int, rise: float = 0.0) -> Points:
+    """About the origin, angles in degrees; its radius grows by ``rise`` in each step."""
+    turns = [(radius + rise * k, math.radians(start + (end - start) * k / steps)) for k in range(steps + 1)]
+    return tuple((round(r * math.cos(a), 3), round(r * math.sin(a), 3)) for r, a in turns)
 
 
 def _helix(turns: int, begin: float, end: float, radius: float) -> Points:
@@ -159,15 +160,7 @@ RUBBER: tuple[Points, ...] = (
     ((0.7, 0.0, 0.0), (1.0, 0.0, 0.0)),
 )
 #: a spiral spring about an axis
-SPIRAL: tuple[Points, ...] = (
-    tuple(
-        (
-            round((1.3 + 0.025 * k) * math.cos(k * math.pi / 10), 3),
-            round((1.3 + 0.025 * k) * math.sin(k * math.pi / 10), 3),
-        )
-        for k in range(51)
-    ),
-)
+SPIRAL: tuple[Points, ...] = (_arc(1.3, 0, 900, 50, rise=0.025),)
 #: the turning pot of a damper about an axis
 TURNING_DASHPOT: tuple[Points, ...] = (_arc(1.6, 20, 160, 12), _arc(2.2, 0, 180, 16))
 #: a round arrow: a motor or torque about an axis

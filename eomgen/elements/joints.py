@@ -21,7 +21,7 @@ from .element_type import Element, ElementType, key, keys_of, table
 from .glyphs import JointLook, SymbolPart
 from .kinds import MOTION, Choice, Fields, Scalar, Vector, ref
 from .rotations import euler_parameters_from_matrix
-from .scalars import AXES, elementary
+from .scalars import AXES, axes_of_turns, turned
 
 # -- the class ---------------------------------------------------------------------------------------------------------
 
@@ -119,7 +119,8 @@ class Joint(Element):
     options : further keys of this type: the fields that :func:`~eomgen.elements.element_type.key` marks
     coordinates : the coordinates, in order
     fixed_axes : axes of P along which the origin of S stays at that of P
-    parallel_axes : axes of S that stay parallel to those of P: '', 'z' or 'xyz'
+    turns : axes about which S turns against P, each in the frame that the turns before made; a key of the type may name
+        others
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
@@ -139,7 +140,7 @@ class Joint(Element):
     options: ClassVar[Fields] = {}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
     fixed_axes = ""
-    parallel_axes = ""
+    turns = "xyz"
     quaternion_slots: ClassVar[tuple[QuaternionSlot, ...]] = ()
     look: ClassVar[JointLook] = JointLook()
 
@@ -189,7 +190,7 @@ class Joint(Element):
         """Equations that hold the relative pose to what the joint allows, when a loop is closed by it."""
         rows = [Closure(f"r_{axis}", position[AXES[axis]], "length") for axis in self.fixed_axes]
         turns = (("z.x", rotation[0][2]), ("z.y", rotation[1][2]), ("x.y", rotation[1][0]))
-        return rows + [Closure(*turn, "angle") for turn in turns[: {"": 0, "z": 2, "xyz": 3}[self.parallel_axes]]]
+        return rows + [Closure(*turn, "angle") for turn in turns[: {"": 3, "z": 2}.get(self.turns, 0)]]
 
     @abstractmethod
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
@@ -201,40 +202,20 @@ class Joint(Element):
 
     def aligned(self, rotation: Mat3) -> list[Expr]:
         """Expressions that must be positive: the closure equations alone also admit anti-parallel axes."""
-        return [rotation[axis][axis] for axis in {"": (), "z": (2,), "xyz": (0, 2)}[self.parallel_axes]]
+        return [rotation[axis][axis] for axis in {"": (0, 2), "z": (2,)}.get(self.turns, ())]
 
 
 # -- rotation coordinates ----------------------------------------------------------------------------------------------
 
 
-def unit(graph: Graph, axis: int) -> Vec3:
-    """The unit vector of axis 0, 1 or 2."""
-    o, i = graph.zero, graph.one
-    return ((i, o, o), (o, i, o), (o, o, i))[axis]
+def euler(graph: Graph, sequence: str, angles: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+    """R = R_a(q1) R_b(q2) R_c(q3), intrinsic: each turn is about an axis of the frame the one before made.
 
-
-def about(graph: Graph, axis: int, angle: Expr) -> Mat3:
-    """Rotation by ``angle`` about axis 0, 1 or 2; takes turned axes to the original ones."""
-    return vec.matrix(graph, elementary(axis, angle))
-
-
-def euler(graph: Graph, sequence: str, angles: Sequence[Expr]) -> Mat3:
-    """R = R_a(q1) R_b(q2) R_c(q3), intrinsic: each turn is about an axis of the frame the one before made."""
-    result = about(graph, AXES[sequence[0]], angles[0])
-    for letter, angle in zip(sequence[1:], angles[1:], strict=True):
-        result = vec.product(result, about(graph, AXES[letter], angle))
-    return result
-
-
-def euler_rates(graph: Graph, sequence: str, angles: Sequence[Expr]) -> list[Vec3]:
-    """Columns g_k with omega = sum g_k q_k' in the turned axes (Shabana, ch. 7: omega-bar = G-bar theta')."""
-    columns = []
-    for k, letter in enumerate(sequence):
-        column = unit(graph, AXES[letter])
-        for later, angle in zip(sequence[k + 1 :], angles[k + 1 :], strict=True):
-            column = vec.transpose_times(about(graph, AXES[later], angle), column)
-        columns.append(column)
-    return columns
+    And the columns g_k with omega = sum g_k q_k' in the turned axes (Shabana, ch. 7: omega-bar = G-bar theta').
+    """
+    axes = [AXES[letter] for letter in sequence]
+    rotation = vec.matrix(graph, turned(axes, angles))
+    return rotation, [vec.vector(graph, column) for column in axes_of_turns(axes, angles, -1)]
 
 
 def euler_angles(graph: Graph, sequence: str, rotation: Mat3) -> list[Expr]:
@@ -244,20 +225,16 @@ def euler_angles(graph: Graph, sequence: str, rotation: Mat3) -> list[Expr]:
     of the two alone loses half the digits.
     """
     i, j, k = (AXES[letter] for letter in sequence)
+    other, sign = 3 - i - j, 1.0 if (j - i) % 3 == 1 else -1.0
     if i != k:
-        sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
         upper, lower = rotation[j][k], rotation[k][k]
         first = atan2(-sign * upper, lower)
         second = atan2(sign * rotation[i][k], sqrt(upper * upper + lower * lower))
-        third = atan2(-sign * rotation[i][j], rotation[i][i])
-        return [first, second, third]
-    other = 3 - i - j
-    sign = 1.0 if (i, j, other) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
+        return [first, second, atan2(-sign * rotation[i][j], rotation[i][i])]
     upper, lower = rotation[j][i], rotation[other][i]
     first = atan2(upper, -sign * lower)
     second = atan2(sqrt(upper * upper + lower * lower), rotation[i][i])
-    third = atan2(rotation[i][j], sign * rotation[i][other])
-    return [first, second, third]
+    return [first, second, atan2(rotation[i][j], sign * rotation[i][other])]
 
 
 def parameter_rotation(graph: Graph, e: Sequence[Expr]) -> Mat3:
@@ -283,62 +260,88 @@ def parameter_rates(e: Sequence[Expr], w: Sequence[Expr]) -> list[Expr]:
     ]
 
 
-# -- axes that stay parallel -------------------------------------------------------------------------------------------
+# -- sliding and turning -----------------------------------------------------------------------------------------------
 
 
-class AxisJoint(Joint):
-    """S slides along the axes that are not held, and turns about z where all axes are not kept parallel.
+ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
+PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
 
-    The coordinates are the lengths in the order x, y, z, then the angle.
+
+class PoseJoint(Joint):
+    """S slides along the axes of P that are not fixed, then turns about the axes of its sequence.
+
+    The coordinates are the lengths in the order x, y, z, then the angles.
     """
 
-    def _free(self, three: Sequence[Vec3] | Vec3) -> list[Any]:
-        return [one for axis, one in zip("xyz", three, strict=True) if axis not in self.fixed_axes]
+    def __init_subclass__(cls) -> None:
+        if "coordinates" not in vars(cls):
+            lengths = [Coordinate(f"_{axis}", "length") for axis in "xyz" if axis not in cls.fixed_axes]
+            every = (*lengths, *(ANGLES[AXES[axis]] for axis in cls.turns))
+            cls.coordinates = every if len(every) != 1 else (Coordinate("", every[0].kind),)
+        super().__init_subclass__()
 
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+    def place(self, graph: Graph, q: Sequence[Expr]) -> Vec3:
+        """Position of S's origin in P axes."""
         lengths = iter(q)
         x, y, z = (graph.zero if axis in self.fixed_axes else next(lengths) for axis in "xyz")
-        return about(graph, 2, q[-1]) if self.parallel_axes == "z" else vec.identity(graph), (x, y, z)
+        return x, y, z
+
+    def slides(self, graph: Graph, q: Sequence[Expr]) -> list[Vec3]:
+        """Its derivatives by the coordinates before the angles."""
+        return [row for axis, row in zip("xyz", vec.identity(graph), strict=True) if axis not in self.fixed_axes]
+
+    def turn(self, graph: Graph, angles: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        """Rotation of S in P, and the columns of its angular velocity."""
+        return euler(graph, getattr(self, "sequence", self.turns), angles)
+
+    def _turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        return self.turn(graph, [x for x, one in zip(q, self.coordinates, strict=True) if one.kind != "length"])
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self._turn(graph, q)[0], self.place(graph, q)
 
     def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        o = vec.zero(graph)
-        columns = [(o, row) for row in self._free(self.pose(graph, q)[0])]  # R^T e_k is row k of R
-        return columns + [(unit(graph, 2), o)] * (self.parallel_axes == "z")
+        o, (rotation, rates) = vec.zero(graph), self._turn(graph, q)
+        columns = [(o, vec.transpose_times(rotation, slide)) for slide in self.slides(graph, q)]
+        return columns + [(rate, o) for rate in rates]
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return self._free(position) + ([atan2(rotation[1][0], rotation[0][0])] if self.parallel_axes == "z" else [])
+        lengths = [length for axis, length in zip("xyz", position, strict=True) if axis not in self.fixed_axes]
+        return lengths + self.measure_turn(graph, rotation)
+
+    def measure_turn(self, graph: Graph, rotation: Mat3) -> list[Expr]:
+        """The angles as functions of a relative rotation that the joint allows."""
+        return [atan2(rotation[1][0], rotation[0][0])] if self.turns else []
 
 
 # -- one degree of freedom ---------------------------------------------------------------------------------------------
 
 
-class Revolute(AxisJoint):
+class Revolute(PoseJoint):
     """S turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     sentence = "S turns about the axis {z} that it shares with P; the origins coincide."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q), \quad \mathbf{u} = \mathbf{0}"
     look = JointLook((SymbolPart("cylinder", (0.75, 2.5)),))
-    coordinates = (Coordinate("", "angle"),)
     fixed_axes = "xyz"
-    parallel_axes = "z"
+    turns = "z"
 
 
 class Continuous(Revolute):
     """A revolute joint without limits, as URDF calls it.  Allows 1, removes 5."""
 
 
-class Prismatic(AxisJoint):
+class Prismatic(PoseJoint):
     """S slides along the common z axis without turning.  Allows 1, removes 5."""
 
     sentence = "S slides along the axis {z} that it shares with P, without turning."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q \mathbf{e}_{z}"
     look = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
-    coordinates = (Coordinate("", "length"),)
     fixed_axes = "xy"
-    parallel_axes = "xyz"
+    turns = ""
 
 
-class Screw(AxisJoint):
+class Screw(PoseJoint):
     """S turns about the common z axis and slides along it by ``pitch`` (m) per turn.  Allows 1, removes 5.
 
     The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
@@ -350,7 +353,7 @@ class Screw(AxisJoint):
     counts_turns = True
     coordinates = (Coordinate("", "angle"),)
     fixed_axes = "xy"
-    parallel_axes = "z"
+    turns = "z"
     pitch: Expr = key(
         Scalar(
             "advance of S per turn (m), negative for a left-handed thread",
@@ -365,11 +368,12 @@ class Screw(AxisJoint):
         """Advance per radian (m)."""
         return self.pitch / (2 * math.pi)
 
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return about(graph, 2, q[0]), (graph.zero, graph.zero, self.lead * q[0])
+    def place(self, graph: Graph, q: Sequence[Expr]) -> Vec3:
+        return graph.zero, graph.zero, self.lead * q[0]
 
     def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(unit(graph, 2), vec.scale(self.lead, unit(graph, 2)))]
+        z = vec.identity(graph)[2]
+        return [(z, vec.scale(self.lead, z))]
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         """The angle from where the advance z wants x_S to where it is: an equation that knows no full turns."""
@@ -389,40 +393,37 @@ class Screw(AxisJoint):
 # -- several degrees of freedom ----------------------------------------------------------------------------------------
 
 
-class Cylindrical(AxisJoint):
+class Cylindrical(PoseJoint):
     """S slides along the common z axis and turns about it.  Allows 2, removes 4."""
 
     sentence = "S slides along the common axis {z} and turns about it."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_2), \quad \mathbf{u} = q_1 \mathbf{e}_{z}"
     look = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
-    coordinates = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
     fixed_axes = "xy"
-    parallel_axes = "z"
+    turns = "z"
 
 
-class Planar(AxisJoint):
+class Planar(PoseJoint):
     """S moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
     sentence = "S slides along the axes {x} and {y} of P and turns about the axis {z}."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{z}(q_3), \quad \mathbf{u} = q_1 \mathbf{e}_{x} + q_2 \mathbf{e}_{y}"
     look = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
-    coordinates = (Coordinate("_x", "length"), Coordinate("_y", "length"), Coordinate("_3", "angle"))
     fixed_axes = "z"
-    parallel_axes = "z"
+    turns = "z"
 
 
-class Translational(AxisJoint):
+class Translational(PoseJoint):
     """S slides along x, y and z of P without turning.  Allows 3, removes 3."""
 
     sentence = "S slides along the three axes of P without turning."
     formula = r"\mathbf{R}_{PS} = \mathbf{1}, \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
     look = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
     has_axis = False
-    coordinates = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
-    parallel_axes = "xyz"
+    turns = ""
 
 
-class Weld(AxisJoint):
+class Weld(PoseJoint):
     """S is fixed to P.  Allows 0, removes 6."""
 
     sentence = "S is fixed to P."
@@ -430,16 +431,13 @@ class Weld(AxisJoint):
     look = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
     has_axis = False
     fixed_axes = "xyz"
-    parallel_axes = "xyz"
+    turns = ""
 
 
 # -- two angles between shafts -----------------------------------------------------------------------------------------
 
 
-TWO_ANGLES = (Coordinate("_1", "angle"), Coordinate("_2", "angle"))
-
-
-class Universal(Joint):
+class Universal(PoseJoint):
     """A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular.  Allows 2, removes 4.
 
     R = R_x(q1) R_y(q2); the shafts are the z axes, in line at zero (Shabana, sec. 7.7, universal joint).
@@ -448,24 +446,18 @@ class Universal(Joint):
     sentence = "A cross turns about the axis {x} of P and the axis {y} of S, which stay perpendicular."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}_{x}(q_1) \mathbf{R}_{y}(q_2), \quad \mathbf{u} = \mathbf{0}"
     look = JointLook((SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y")))
-    coordinates = TWO_ANGLES
     fixed_axes = "xyz"
+    turns = "xy"
     has_axes = True
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return euler(graph, "xy", q), vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(g, vec.zero(graph)) for g in euler_rates(graph, "xy", q)]
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         return [*super().closure(graph, rotation, position), Closure("x.y", rotation[0][1], "angle")]
 
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+    def measure_turn(self, graph: Graph, rotation: Mat3) -> list[Expr]:
         return [atan2(rotation[2][1], rotation[1][1]), atan2(rotation[0][2], rotation[0][0])]
 
 
-class ConstantVelocity(Joint):
+class ConstantVelocity(PoseJoint):
     """The shaft bends in any direction, and S turns exactly as fast as P.  Allows 2, removes 4.
 
     R = R_x(q1/2) R_y(q2) R_x(q1/2).  A palindrome of turns about x and y has no z part in its quaternion
@@ -477,19 +469,13 @@ class ConstantVelocity(Joint):
     sentence = "The shaft along the axis {z} bends about any axis across it and passes its turning on evenly."
     formula = r"\omega_S \cdot \mathbf{e}_{z}^S = \omega_P \cdot \mathbf{e}_{z}^P"
     look = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
-    coordinates = TWO_ANGLES
     fixed_axes = "xyz"
+    turns = "xy"
 
-    def _angles(self, q: Sequence[Expr]) -> tuple[Expr, Expr, Expr]:
-        return 0.5 * q[0], q[1], 0.5 * q[0]
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return euler(graph, "xyx", self._angles(q)), vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        first, second, third = euler_rates(graph, "xyx", self._angles(q))
-        o = vec.zero(graph)
-        return [(vec.scale(graph.constant(0.5), vec.add(first, third)), o), (second, o)]
+    def turn(self, graph: Graph, angles: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        half = 0.5 * angles[0]
+        rotation, (first, second, third) = euler(graph, "xyx", (half, angles[1], half))
+        return rotation, [vec.scale(graph.constant(0.5), vec.add(first, third)), second]
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
         bend = Closure("x.y", rotation[1][0] - rotation[0][1], "angle")  # 4 e0 e3
@@ -498,7 +484,7 @@ class ConstantVelocity(Joint):
     def aligned(self, rotation: Mat3) -> list[Expr]:
         return [rotation[0][0] + rotation[1][1]]  # 2 (e0^2 - e3^2): it is e3 that vanishes, not e0
 
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+    def measure_turn(self, graph: Graph, rotation: Mat3) -> list[Expr]:
         """From 4 e0 e1, 4 e0 e2 and 4 e0^2 with e = (cos q2/2 cos q1/2, cos q2/2 sin q1/2, sin q2/2, 0)."""
         scalar = 1.0 + rotation[0][0] + rotation[1][1] + rotation[2][2]
         about_x, about_y = rotation[2][1] - rotation[1][2], rotation[0][2] - rotation[2][0]
@@ -509,17 +495,14 @@ class ConstantVelocity(Joint):
 # -- all axes ----------------------------------------------------------------------------------------------------------
 
 
-ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
-PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
 ROTATION = Choice(
     "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
     default="euler_angles",
     choices=("euler_angles", "euler_parameters"),
 )
-PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
 
 
-class RotatingJoint(Joint):
+class RotatingJoint(PoseJoint):
     """What spherical and free joints share: how they describe a rotation.
 
     ``rotation`` is ``euler_angles`` (intrinsic, x-y'-z'' unless ``sequence`` says otherwise; singular where the middle
@@ -528,39 +511,25 @@ class RotatingJoint(Joint):
     """
 
     has_axis = False
-    place: ClassVar[tuple[Coordinate, ...]] = ()
     sequence: str = key(SEQUENCE)
     rotation: str = key(ROTATION)
 
     def __post_init__(self) -> None:
-        if self.in_parameters:
-            n = len(self.place)
-            object.__setattr__(self, "coordinates", (*self.place, *PARAMETERS))
-            object.__setattr__(self, "quaternion_slots", (QuaternionSlot(n, n),))
+        if self.rotation == "euler_parameters":
+            lengths = self.coordinates[:-3]
+            object.__setattr__(self, "coordinates", (*lengths, *PARAMETERS))
+            object.__setattr__(self, "quaternion_slots", (QuaternionSlot(len(lengths), len(lengths)),))
 
-    @property
-    def in_parameters(self) -> bool:
-        """Whether the rotation is described by Euler parameters."""
-        return self.rotation == "euler_parameters"
+    def turn(self, graph: Graph, angles: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        """Of Euler parameters the columns are constant."""
+        if self.quaternion_slots:
+            return parameter_rotation(graph, angles), [*vec.identity(graph)]
+        return super().turn(graph, angles)
 
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        n = len(self.place)
-        turn = parameter_rotation(graph, q[n:]) if self.in_parameters else euler(graph, self.sequence, q[n:])
-        return turn, (q[0], q[1], q[2]) if n else vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        """Columns of the angular velocity are constant for Euler parameters."""
-        n, o, places = len(self.place), vec.zero(graph), list[tuple[Vec3, Vec3]]()
-        if n:
-            places = [(o, row) for row in self.pose(graph, q)[0]]
-        if self.in_parameters:
-            return places + [(unit(graph, k), o) for k in range(3)]
-        return places + [(g, o) for g in euler_rates(graph, self.sequence, q[n:])]
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        parameters = self.in_parameters
-        turn = euler_parameters_from_matrix(rotation) if parameters else euler_angles(graph, self.sequence, rotation)
-        return [*position[: len(self.place)], *turn]
+    def measure_turn(self, graph: Graph, rotation: Mat3) -> list[Expr]:
+        if self.quaternion_slots:
+            return [*euler_parameters_from_matrix(rotation)]
+        return euler_angles(graph, self.sequence, rotation)
 
 
 class Spherical(RotatingJoint):
@@ -569,7 +538,6 @@ class Spherical(RotatingJoint):
     sentence = "S turns about its origin, which stays at the origin of P."
     formula = r"\mathbf{R}_{PS} = \mathbf{R}(q_1,q_2,q_3), \quad \mathbf{u} = \mathbf{0}"
     look = JointLook((SymbolPart("sphere", (1.0,)),))
-    coordinates = ANGLES
     fixed_axes = "xyz"
 
 
@@ -580,8 +548,6 @@ class Free(RotatingJoint):
     formula = (
         r"\mathbf{R}_{PS} = \mathbf{R}(q), \quad \mathbf{u} = q_1 \mathbf{e}_x + q_2 \mathbf{e}_y + q_3 \mathbf{e}_z"
     )
-    place = PLACE
-    coordinates = PLACE + ANGLES
 
 
 # -- guides: S is led by a curve or a surface of P; they stay in the tree ----------------------------------------------
@@ -609,7 +575,7 @@ class GuidePoint(Vector):
         return Shape((reader.stand_in,) * 3, ())
 
 
-class Guide(Joint):
+class Guide(PoseJoint):
     """The origin of S is at a point r of P that depends on the first coordinates, the parameters of the shape.
 
     The parameters cannot be told from a pose without solving equations, so such a joint never closes a loop: another
@@ -618,6 +584,7 @@ class Guide(Joint):
 
     role = "tree"
     has_axis = False
+    turns = ""
     look = JointLook((SymbolPart("sphere", (1.0,)),))
 
     @property
@@ -626,33 +593,22 @@ class Guide(Joint):
         result: Shape = getattr(self, next(iter(self.options)))
         return result
 
-    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
-        """Rotation of S in P and the columns of its angular velocity for the coordinates behind the parameters."""
-        return vec.identity(graph), []
+    def place(self, graph: Graph, q: Sequence[Expr]) -> Vec3:
+        return self._at(q, self.shape.point)
 
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return self.turn(graph, q)[0], self._at(q, self.shape.point)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        rotation, rates = self.turn(graph, q)
-        o = vec.zero(graph)
+    def slides(self, graph: Graph, q: Sequence[Expr]) -> list[Vec3]:
         point, parameters = self.shape
-        columns = []
-        for parameter in parameters:
-            x, y, z = jvp(list(point), {parameter: graph.one})
-            columns.append((o, vec.transpose_times(rotation, self._at(q, (x, y, z)))))
-        return [*columns, *((rate, o) for rate in rates)]
+        return [self._at(q, jvp(list(point), {parameter: graph.one})) for parameter in parameters]
 
-    def _at(self, q: Sequence[Expr], point: Vec3) -> Vec3:
+    def _at(self, q: Sequence[Expr], point: Sequence[Expr]) -> Vec3:
         parameters = self.shape.parameters
         x, y, z = substitute(list(point), dict(zip(parameters, q[: len(parameters)], strict=True)))
         return (x, y, z)
 
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> Any:
         raise TypeError(f"a {self.type_name} joint cannot be cut")
 
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        raise TypeError(f"a {self.type_name} joint cannot be cut")
+    measure = closure
 
 
 class CurveSlider(Guide):
@@ -696,11 +652,8 @@ class SurfaceSlider(Guide):
 class TurningGuide(Guide):
     """A guide on which S also turns freely about its origin, in Euler angles."""
 
+    turns = "xyz"
     sequence: str = key(SEQUENCE)
-
-    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
-        angles = q[len(self.shape.parameters) :]
-        return euler(graph, self.sequence, angles), euler_rates(graph, self.sequence, angles)
 
 
 class PointOnCurve(TurningGuide, CurveSlider):
@@ -735,11 +688,10 @@ class RodJoint(Joint):
     def allows(self) -> int:
         return 6 - self.removes
 
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> Any:
         raise TypeError(f"a {self.type_name} joint cannot be in the tree")
 
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        raise TypeError(f"a {self.type_name} joint cannot be in the tree")
+    subspace = pose
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         return []
@@ -804,7 +756,7 @@ class Parallel(RodJoint):
     sentence = "The axes {z} of P and S stay parallel."
     formula = r"\mathbf{e}_{x}^P \cdot \mathbf{e}_{z}^S = 0, \quad \mathbf{e}_{y}^P \cdot \mathbf{e}_{z}^S = 0"
     removes = 2
-    parallel_axes = "z"
+    turns = "z"
 
 
 class Perpendicular(RodJoint):
@@ -825,7 +777,7 @@ class Orientation(RodJoint):
     formula = r"\mathbf{R}_{PS} = \mathbf{1}"
     removes = 3
     has_axis = False
-    parallel_axes = "xyz"
+    turns = ""
 
 
 def joint(kind: type[Joint]) -> ElementType:
@@ -836,13 +788,9 @@ def joint(kind: type[Joint]) -> ElementType:
     return ElementType(kind.type_name, doc, kind.keys(), ends=("predecessor", "successor"), kind=kind)
 
 
-JOINTS = table(
-    *map(
-        joint,
-        (
-            *(Revolute, Continuous, Prismatic, Screw, Cylindrical, Planar, Translational, Weld, Universal),
-            *(ConstantVelocity, Spherical, Free, CurveSlider, SurfaceSlider, PointOnCurve, PointOnSurface, Distance),
-            *(RevoluteSpherical, Inline, Inplane, Parallel, Perpendicular, Orientation),
-        ),
-    )
+_KINDS: tuple[type[Joint], ...] = (
+    *(Revolute, Continuous, Prismatic, Screw, Cylindrical, Planar, Translational, Weld, Universal),
+    *(ConstantVelocity, Spherical, Free, CurveSlider, SurfaceSlider, PointOnCurve, PointOnSurface, Distance),
+    *(RevoluteSpherical, Inline, Inplane, Parallel, Perpendicular, Orientation),
 )
+JOINTS = table(*map(joint, _KINDS))

@@ -84,8 +84,6 @@ def define(name: str, schema: Schema | Callable[[], Schema]) -> tuple[Schema, di
 
 
 _TEXT: Schema = {"type": "string"}
-_FLAG: Schema = {"type": "boolean"}
-_WHOLE: Schema = {"type": "integer", "minimum": 1}
 _NUMBER: Schema = {"type": ["number", "string"]}
 
 
@@ -110,6 +108,8 @@ class Field:
     schema: ClassVar[Schema] = {}
     defines: ClassVar[Mapping[str, Schema | Callable[[], Schema]]] = {}  #: what the schema refers to
     holds: str = ""  #: what a visitor changes of it: vector, marker, latex, or the names coordinate, body
+    by_coordinate: ClassVar[bool] = False  #: whether it may be a mapping of coordinates to what it holds, or scalars
+    refers: ClassVar[str] = ""  #: to what a handle in its place refers: marker or joint
     joins: ClassVar[bool] = False  #: whether the method has an argument for each of its two ends
     parts: ClassVar[Fields] = {}  #: keys within it
 
@@ -160,6 +160,22 @@ class Field:
         return self.argument
 
     # -- values ---------------------------------------------------------------------------------------------------
+    def read_square(self, reader: Any, path: str, value: Any, size: int) -> Any:
+        """The rows of a square matrix, or of one with the diagonal that is given; None, and a fault, if it is none."""
+        listed = items(value) or ()
+        rows = [items(part) for part in listed] if len(listed) == size else [None, []]
+        if all(row is None for row in rows):
+            diagonal = [reader.expression(f"{path}[{k}]", x, self.level) for k, x in enumerate(listed)]
+            return tuple(tuple(x if i == j else reader.graph.zero for j in range(size)) for i, x in enumerate(diagonal))
+        if all(row is not None and len(row) == size for row in rows):
+            every = [enumerate(row or ()) for row in rows]
+            return tuple(
+                tuple(reader.expression(f"{path}[{i}][{j}]", x, self.level) for j, x in row)
+                for i, row in enumerate(every)
+            )
+        reader.wrong(path, value, self)
+        return None
+
     def read(self, reader: Any, path: str, value: Any) -> Any:
         """What a value means; a fault is noted at ``path``, and None or a stand-in returned, where it means nothing."""
         raise NotImplementedError(f"{type(self).__name__} is read with the rest of its entry")
@@ -170,10 +186,14 @@ class Field:
 
     def reference(self, value: Any, refer: Any) -> Any:
         """A value of a call in Python as a model file would write it: names of markers and joints for handles."""
-        return value
+        one = getattr(refer, self.refers) if self.refers else lambda value: value
+        return [one(part) for part in items(value) or [value]] if self.joins else one(value)
 
     def map(self, value: Any, visitor: Any) -> Any:
         """A value as a visitor changes what it holds; what has not the form of the kind stays as it is."""
+        if self.by_coordinate and isinstance(value, Mapping):
+            one = getattr(visitor, self.holds or "scalar")
+            return {visitor.coordinate(str(name)): one(part) for name, part in value.items()}
         if isinstance(value, list | tuple) and self.holds:
             return [self.map(part, visitor) for part in value]
         no_name = self.holds in ("coordinate", "body") and not isinstance(value, str)
@@ -181,7 +201,8 @@ class Field:
 
     def is_default(self, value: Any) -> bool:
         """Whether leaving a value out means the same."""
-        return value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0)
+        nothing = value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0)
+        return nothing or (self.default == (0, 0, 0) and is_zero(value))
 
     def part(self, path: Sequence[str]) -> Field | None:
         """The key of a scalar within it, behind these words; itself where it has no parts."""
@@ -234,11 +255,7 @@ class Latex(Text):
     """The LaTeX of a symbol, such as \\theta_1."""
 
     holds = "latex"
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {visitor.coordinate(str(name)): visitor.latex(part) for name, part in value.items()}
-        return super().map(value, visitor)
+    by_coordinate = True
 
 
 class Latexes(Latex):
@@ -248,11 +265,14 @@ class Latexes(Latex):
     schema = any_of(_TEXT, array({"type": ["string", "null"]}), _mapping(_TEXT, propertyNames=ref("name")))
 
 
+_NAME = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST}
+
+
 class Name(Field):
     """A name."""
 
     argument, annotation = "str or symbol", "Any"
-    schema, defines = define("name", {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST})
+    schema, defines = define("name", _NAME)
 
 
 class Names(Field):
@@ -276,12 +296,17 @@ class SomeNames(Field):
         return listed
 
 
-class Reference(Field):
-    """A name, with those of instances and of bodies before it: ``leg1.foot.tip``."""
+_DOTTED = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
 
-    schema, defines = define(
-        "reference", {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
-    )
+
+class BodyName(Field):
+    """The name of a body."""
+
+    argument, annotation = "handle or str", "Any"
+    schema, defines = define("reference", _DOTTED)
+    read = by("body")
+    holds = "body"
+    refers = "marker"
 
 
 class Choice(Field):
@@ -304,7 +329,7 @@ class Flag(Field):
     """True or false."""
 
     argument, annotation = "bool", "bool"
-    schema = _FLAG
+    schema: ClassVar[Schema] = {"type": "boolean"}
     read = by("flag")
 
 
@@ -370,7 +395,7 @@ class PositiveNumber(Number):
 class Count(Field):
     """A whole number greater than 0."""
 
-    schema = _WHOLE
+    schema: ClassVar[Schema] = {"type": "integer", "minimum": 1}
 
 
 class Numbers(Field):
@@ -405,7 +430,7 @@ class Functions(Field):
     """A list of names of C functions, null for one that is not there."""
 
     argument, annotation = "sequence", "Sequence[Any]"
-    schema = array({"anyOf": [ref("name"), {"type": "null"}]})
+    schema = array(any_of(ref("name"), {"type": "null"}))
 
 
 # -- expressions ------------------------------------------------------------------------------------------------------
@@ -440,9 +465,6 @@ class Vector(Scalar):
     def absent(self, reader: Any) -> Any:
         return (reader.stand_in,) * 3
 
-    def is_default(self, value: Any) -> bool:
-        return super().is_default(value) or (self.default == (0, 0, 0) and is_zero(value))
-
 
 class Value(Scalar):
     """A number or an expression for a joint, three of them [x, y, z] for a body."""
@@ -467,6 +489,12 @@ class Scalars(Field):
     holds = "vector"
 
 
+class Places(Scalars):
+    """A list of points [x, y]."""
+
+    schema = array(array(ref("expression"), 2, 2), 2)
+
+
 class Two(Scalars):
     """A list of two numbers or expressions."""
 
@@ -477,12 +505,6 @@ class Two(Scalars):
 
 class Radii(Two):
     """Two numbers or expressions."""
-
-
-class Places(Scalars):
-    """A list of points [x, y]."""
-
-    schema = array(array(ref("expression"), 2, 2), 2)
 
 
 class Matrix(Scalars):
@@ -505,18 +527,7 @@ class Matrix6(Scalars):
     schema = any_of(array(ref("expression"), 6, 6), array(array(ref("expression"), 6, 6), 6, 6))
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
-        listed, zero = items(value) or (), reader.graph.zero
-        rows = [items(part) for part in listed] if len(listed) == 6 else []
-        if rows and all(row is None for row in rows):
-            diagonal = [reader.expression(f"{path}[{k}]", x, self.level) for k, x in enumerate(listed)]
-            return tuple(tuple(x if i == j else zero for j in range(6)) for i, x in enumerate(diagonal))
-        if rows and all(row is not None and len(row) == 6 for row in rows):
-            return tuple(
-                tuple(reader.expression(f"{path}[{i}][{j}]", x, self.level) for j, x in enumerate(row or ()))
-                for i, row in enumerate(rows)
-            )
-        reader.wrong(path, value, self)
-        return None
+        return self.read_square(reader, path, value, 6)
 
     def measured_in(self, values: Mapping[str, Any], place: tuple[Any, ...], length: bool) -> Dimension | None:
         """Three forces, then three torques; three lengths, then three angles."""
@@ -529,25 +540,20 @@ class Rates(Field):
 
     argument, annotation = "mapping", "Mapping[Any, Value]"
     schema = _mapping(ref("expression"))
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        if not isinstance(value, Mapping):
-            return value
-        return {visitor.coordinate(str(name)): visitor.scalar(x) for name, x in value.items()}
+    by_coordinate = True
 
 
 class CoordinateForces(Rates):
     """A mapping of coordinates to expressions, or a list of one expression for each coordinate."""
 
     schema = any_of(array(ref("expression")), _mapping(ref("expression")))
-
-    def map(self, value: Any, visitor: Any) -> Any:
-        return super().map(value, visitor) if isinstance(value, Mapping) else visitor.vector(value)
+    holds = "vector"
 
 
-class Factors(Rates):
+class Factors(Field):
     """A mapping of coordinates to numbers or expressions."""
 
+    argument, annotation, by_coordinate = "mapping", "Mapping[Any, Value]", True
     schema = _mapping(ref("expression"), minProperties=1)
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
@@ -608,19 +614,7 @@ class Inertia(Wheels):
             raw = {key: reader.expression(f"{path}.{key}", value[key]) for key in self.names if key in value}
             xx, yy, zz, xy, xz, yz = (raw.get(key, zero) for key in self.names)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-        parts = items(value)
-        if parts is not None and len(parts) == 3:
-            rows = [items(part) for part in parts]
-            if all(row is not None and len(row) == 3 for row in rows):
-                return tuple(reader.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
-            if all(row is None for row in rows):
-                a, b, c = reader.vector(path, parts)
-                return ((a, zero, zero), (zero, b, zero), (zero, zero, c))
-        reader.wrong(path, value, self)
-        return ((reader.stand_in,) * 3,) * 3
-
-    def is_default(self, value: Any) -> bool:
-        return super().is_default(value) or is_zero(value)
+        return self.read_square(reader, path, value, 3) or ((reader.stand_in,) * 3,) * 3
 
 
 # -- axes, frames and markers -----------------------------------------------------------------------------------------
@@ -686,13 +680,10 @@ class Markers(Field):
     def map(self, value: Any, visitor: Any) -> Any:
         pairs = value.items() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
         try:
-            return {name: self._placed(placed, visitor) for name, placed in pairs}
+            every = [(name, placed if isinstance(placed, Mapping) else {"at": placed}) for name, placed in pairs]
+            return {name: visitor.placement(visitor.entry.name, placed) for name, placed in every}
         except (TypeError, ValueError):  # no pairs, or names that are no names
             return value
-
-    @staticmethod
-    def _placed(placed: Any, visitor: Any) -> Any:
-        return visitor.placement(visitor.entry.name, placed if isinstance(placed, Mapping) else {"at": placed})
 
 
 class MarkerReference(Field):
@@ -701,26 +692,20 @@ class MarkerReference(Field):
     argument, annotation = "handle or str", "Any"
     holds = "marker"
     schema, defines = define("marker", lambda: any_of(ref("reference"), table_schema(PLACED)))
-    parts = MARKER
-
+    parts, refers = MARKER, "marker"
     read = by("marker")
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return refer.marker(value)
 
 
 class Pair(Field):
     """A list of two markers, each a body, body.marker, ground or {body, at, rpy}."""
 
     argument, annotation = "handles or str", "Sequence[Any]"
-    holds = "marker"
     schema, defines = define("pair", array(ref("marker"), 2, 2))
-    parts, joins = MARKER, True
-
     read = by("pair")
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return [refer.marker(part) for part in items(value) or [value]]
+    holds = "marker"
+    refers = "marker"
+    parts = MARKER
+    joins = True
 
 
 CYLINDER: Fields = {
@@ -766,19 +751,14 @@ class Via(Field):
         reader.check_keys(path, value, CYLINDER)
         if "around" not in value or "radius" not in value:
             return None
-        keys = ("around", "radius", "sense", *self._rubbing(reader, path, value))
-        made = [CYLINDER[key].read(reader, f"{path}.{key}", value.get(key, CYLINDER[key].default)) for key in keys]
-        marker, radius, sense, *rubbing = made
-        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1, *rubbing)
-
-    @staticmethod
-    def _rubbing(reader: Any, path: str, value: Mapping[str, Any]) -> tuple[str, ...]:
-        """Friction of a rope on a cylinder, and the velocity below which it is smoothed; neither where it is smooth."""
-        keys = ("friction", "smoothing")
-        missing = [key for key in keys if key not in value]
+        rubbing = ("friction", "smoothing")  # neither where it is smooth
+        missing = [key for key in rubbing if key not in value]
         if len(missing) == 1:
             reader.faults.missing(f"{path}.{missing[0]}", "give friction and smoothing together, or neither")
-        return () if missing else keys
+        keys = ("around", "radius", "sense", *(() if missing else rubbing))
+        made = [CYLINDER[key].read(reader, f"{path}.{key}", value.get(key, CYLINDER[key].default)) for key in keys]
+        marker, radius, sense, *rest = made
+        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1, *rest)
 
     def reference(self, value: Any, refer: Any) -> Any:
         return [self._refer(stop, refer) for stop in value] or None
@@ -796,39 +776,23 @@ class Via(Field):
 
 
 # -- joints, coordinates and bodies -----------------------------------------------------------------------------------
-class BodyName(Reference):
-    """The name of a body."""
-
-    argument, annotation = "handle or str", "Any"
-    holds = "body"
-    schema = ref("reference")
-    read = by("body")
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return refer.marker(value)
-
-
-class JointReference(Reference):
+class JointReference(Field):
     """The name of a joint, or of one coordinate of a joint."""
 
     argument, annotation = "handle or str", "Any"
-    holds = "coordinate"
+    holds, refers = "coordinate", "joint"
     schema = ref("reference")
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
         return reader.coordinate(path, value, self.measure)
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return refer.joint(value)
 
 
 class JointPair(Field):
     """A list of two joints, or coordinates of joints."""
 
     argument, annotation = "handles or str", "Sequence[Any]"
-    holds = "coordinate"
+    holds, refers, joins = "coordinate", "joint", True
     schema = array(ref("reference"), 2, 2)
-    joins = True
 
     def read(self, reader: Any, path: str, value: Any) -> Any:
         parts = items(value)
@@ -840,9 +804,6 @@ class JointPair(Field):
             reader.fault(path, f"{a.name!r} is named twice", "name two different coordinates", "EG-CONFLICT")
             return None
         return None if a is None or b is None else (a, b)
-
-    def reference(self, value: Any, refer: Any) -> Any:
-        return [refer.joint(part) for part in items(value) or [value]]
 
 
 _SIZE: dict[str, Any] = {"allowed": NOT_NEGATIVE, "remedy": "give the largest size, 0 or positive"}
@@ -914,7 +875,7 @@ class BodyParts(Field):
     """A list of mappings with places in the body."""
 
     argument, annotation = "sequence of mappings", "Sequence[Mapping[str, Any]]"
-    words = ("type", "axis", "subtract", "file", "shape")  #: keys that are words, not scalars
+    words = ("type", "axis", "subtract", "file", "shape", "color")  #: keys that are words, not scalars
 
     def map(self, value: Any, visitor: Any) -> Any:
         return [self._mapped(part, visitor) for part in value] if isinstance(value, list | tuple) else value
@@ -937,7 +898,7 @@ POINT: Fields = {
 class Points(BodyParts):
     """A list of points {mass, at}."""
 
-    schema, defines = define("points", lambda: array(table_schema(POINT)))
+    schema, defines = define("points", array(table_schema(POINT)))
     parts = POINT
 
 
@@ -956,7 +917,7 @@ DISPLAY: Fields = {
 class Display(BodyParts):
     """A list of shapes {shape, ...}."""
 
-    schema, defines = define("display", lambda: array(table_schema(DISPLAY)))
+    schema, defines = define("display", array(table_schema(DISPLAY)))
     parts = DISPLAY
 
 
@@ -974,13 +935,11 @@ class Loops(Field):
     """A mapping of variables to lists, counts or {from, to, step}."""
 
     schema = _mapping(
-        {
-            "anyOf": [
-                array(_NUMBER, 1, ROUNDS),
-                {"type": "integer", "minimum": 1, "maximum": ROUNDS},
-                object_schema({key: {"type": "number"} for key in ("from", "to", "step")}, ["to"]),
-            ]
-        },
+        any_of(
+            array(_NUMBER, 1, ROUNDS),
+            {"type": "integer", "minimum": 1, "maximum": ROUNDS},
+            object_schema({key: {"type": "number"} for key in ("from", "to", "step")}, ["to"]),
+        ),
         propertyNames=ref("name"),
         minProperties=1,
     )

@@ -22,18 +22,18 @@ from .scalars import (
     Scalar,
     atan2,
     axes_of,
+    axes_of_turns,
     combine,
     cos,
     dot,
-    elementary,
     entries,
     require_rotation,
     rows,
     shaped,
     sin,
     sqrt,
-    times,
     transpose,
+    turned,
     where_less,
 )
 
@@ -227,9 +227,7 @@ def matrix_from_euler_angles(sequence: str, angles: Any) -> Any:
         Axes, such as ``"xyz"`` or ``"zxz"``; each turn is about an axis of the frame the one before made.
     angles : (3,) numbers, SymPy expressions or Exprs
     """
-    i, j, k = axes_of(sequence)
-    a, b, c = entries(angles, 3, "Euler angles")
-    return shaped(times(times(elementary(i, a), elementary(j, b)), elementary(k, c)))
+    return shaped(turned(axes_of(sequence), entries(angles, 3, "Euler angles")))
 
 
 def euler_parameters_from_euler_angles(sequence: str, angles: Any) -> Any:
@@ -342,7 +340,7 @@ def rate_matrix(kind: str, values: Any, axes: str = "body", sequence: str = "xyz
     first, second, _ = _coefficients(near)
     series = (1 + square / 60 + square * square / 2520 + square * square * square / 100800) / 12
     factor = where_less(square, NEAR, series, (1 - first / (2 * second)) / near)
-    return shaped(combine(1 - factor * square, -sign * _half(square), factor, v))
+    return shaped(combine(1 - factor * square, -sign * ((square * 0 + 1) / 2), factor, v))
 
 
 def angular_velocity(kind: str, values: Any, rates: Any, axes: str = "body", sequence: str = "xyz") -> Any:
@@ -351,10 +349,6 @@ def angular_velocity(kind: str, values: Any, rates: Any, axes: str = "body", seq
     listed = matrix.tolist() if hasattr(matrix, "tolist") else matrix
     raw = entries(rates, len(listed[0]), "rates")
     return shaped([dot(row, raw) for row in listed])
-
-
-def _half(like: Scalar) -> Scalar:
-    return (like * 0 + 1) / 2  # exact in symbols
 
 
 def _sign(axes: str) -> int:
@@ -370,15 +364,8 @@ def _three(kind: str, values: Any) -> list[Scalar]:
 
 
 def _euler(values: Any, sign: int, sequence: str) -> Rows:
-    """Columns: the axis of each turn, carried through the later turns (body) or the earlier ones (ground)."""
-    turns = [elementary(a, q) for a, q in zip(axes_of(sequence), entries(values, 3, "Euler angles"), strict=True)]
-    columns = []
-    for n, axis in enumerate(axes_of(sequence)):
-        column: Rows = [[int(k == axis)] for k in range(3)]
-        for turn in turns[n + 1 :] if sign < 0 else reversed(turns[:n]):
-            column = times(transpose(turn) if sign < 0 else turn, column)
-        columns.append([x for (x,) in column])
-    return transpose(columns)
+    """Columns: the axis of each turn."""
+    return transpose(axes_of_turns(axes_of(sequence), entries(values, 3, "Euler angles"), sign))
 
 
 def _quaternion(values: Any, sign: int) -> Rows:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -51,19 +51,14 @@ def where_less(a: Scalar, b: Scalar, yes: Scalar, no: Scalar) -> Scalar:
 sin, cos, sqrt, atan2 = (partial(apply, name) for name in ("sin", "cos", "sqrt", "atan2"))
 
 
-def quarter_turns(angle: float, snap: float = 0.0) -> tuple[float, float] | None:
-    """Exact cosine and sine of an angle (rad) within ``snap``, or rounding, of a multiple of pi/2; None of others."""
-    quarter = round(angle / (math.pi / 2))
-    if abs(angle - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-    return None
-
-
 def cosine_and_sine(angle: Scalar, snap: float = 0.0) -> tuple[Scalar, Scalar]:
     """cos and sin; exact 0 and +-1 for numbers within ``snap``, or rounding, of multiples of pi/2."""
     value = angle.value if isinstance(angle, Expr) else angle
-    exact = quarter_turns(value, snap) if isinstance(value, int | float) else None
-    return exact or (cos(angle), sin(angle))
+    if isinstance(value, int | float):
+        quarter = round(value / (math.pi / 2))
+        if abs(value - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
+            return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    return cos(angle), sin(angle)
 
 
 def about(axis: int, c: Scalar, s: Scalar) -> list[list[Scalar]]:
@@ -128,6 +123,23 @@ def axes_of(sequence: str) -> tuple[int, int, int]:
 def elementary(axis: int, angle: Scalar) -> list[list[Scalar]]:
     """Rotation about axis 0, 1 or 2."""
     return about(axis, cos(angle), sin(angle))
+
+
+def turned(axes: Sequence[int], angles: Iterable[Scalar]) -> list[list[Scalar]]:
+    """R = R_a(q1) R_b(q2) ..., intrinsic: each turn is about an axis of the frame that those before it made."""
+    return reduce(times, map(elementary, axes, angles), [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
+
+def axes_of_turns(axes: Sequence[int], angles: Sequence[Scalar], sign: int) -> list[list[Scalar]]:
+    """The axis of each turn, taken through the later turns (body axes, -1) or the earlier ones (ground axes, 1)."""
+    turns = [*map(elementary, axes, angles)]
+    result = []
+    for n, axis in enumerate(axes):
+        column = [[int(k == axis)] for k in range(3)]
+        for turn in turns[n + 1 :] if sign < 0 else reversed(turns[:n]):
+            column = times(transpose(turn) if sign < 0 else turn, column)
+        result.append([x for (x,) in column])
+    return result
 
 
 # -- what comes in and goes out ---------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..base.limits.numbers import ROUNDED
 from ..elements.frames import GROUND, Frame, Marker
-from ..elements.joints import about
+from ..elements.joints import euler
 from ..expr import vectors as vec
 from ..expr.core import Expr, Graph
 from ..expr.evaluate import evaluate
@@ -276,7 +276,7 @@ def resolve_parallel(
             constant = vec.product(constants[link.parent], link.turn)
             constants.append(constant)
             sums.append(total)
-            axes.append(vec.product(constant, about(graph, 2, total)))
+            axes.append(vec.product(constant, euler(graph, "z", [total])[0]))
             position = link.position if holder is None else vec.times(holder, link.position)
             resolved.append(replace(link, turn=still, joint_rotation=still, position=position))
             continue

@@ -593,12 +593,13 @@ def describe_contacts(kinematics: Kinematics) -> dict[str, Any]:
     for branch, link in zip(kinematics.topology.branches, kinematics.links, strict=True):
         last[branch.body] = link.first + len(link.columns) - 1 if link.columns else last[branch.parent]
     listed = [[force.name, len(force.near(kinematics.motion)), len(force.met_shapes())] for force in forces]
+    bodies = [body for force in forces for _, body in force.met_shapes()]
     return {
         "rigid_contacts": {
             "lists": listed,
-            "moved_by": [last[body] for force in forces for body in force.met_bodies],
+            "moved_by": [last[body] for body in bodies],
             "parents": list(kinematics.parent),
-            "bodies": [kinematics.motion.body(body).label for force in forces for body in force.met_bodies],
+            "bodies": [kinematics.motion.body(body).label for body in bodies],
         },
         **({"rigid_by_motion": moving} if (moving := _by_motion(kinematics, forces)) else {}),
         **({"rigid_only": rigid} if (rigid := [force.name for force in forces if force.is_rigid]) else {}),

@@ -394,18 +394,16 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
             f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "allowed are q, t and parameters", "EG-EXPRESSION"
         )
         return
-    n = len(rows)
     values = {name: 0.37 + 0.61 * ((k * 0.618033988749895) % 1.0) for k, name in enumerate(sorted(used))}
     numbers = [float(x) for x in evaluate(flat, values)]
     size = max((abs(x) for x in numbers if math.isfinite(x)), default=0.0)
-    for i in range(n):
-        for j in range(i):
-            gap = abs(numbers[i * n + j] - numbers[j * n + i])
-            if gap > TENSOR * size:  # false where an entry is not finite there
-                message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
-                remedy = "give the symmetric M of M v' = f, where f contains all forces"
-                reader.fault(f"{PATH}.mass_matrix", message, remedy, "EG-INERTIA")
-                return
+    for i, j in ((i, j) for i in range(len(rows)) for j in range(i)):
+        gap = abs(numbers[i * len(rows) + j] - numbers[j * len(rows) + i])
+        if gap > TENSOR * size:  # false where an entry is not finite there
+            message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
+            remedy = "give the symmetric M of M v' = f, where f contains all forces"
+            reader.fault(f"{PATH}.mass_matrix", message, remedy, "EG-INERTIA")
+            return
 
 
 # -- rates of inputs ---------------------------------------------------------------------------------------------------

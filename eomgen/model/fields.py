@@ -169,7 +169,7 @@ class Solids(k.BodyParts):
     """A list of solids {type, ...}."""
 
     schema, defines = k.define("solids", lambda: k.array({"oneOf": [_solid_schema(name) for name in SOLID]}))
-    parts = {key: field for fields in SOLID.values() for key, field in fields.items()} | MARKER
+    parts = {key: field for fields in SOLID.values() for key, field in fields.items()} | MARKER | {"mass": _MASS}
 
 
 def _solid_schema(name: str) -> k.Schema:

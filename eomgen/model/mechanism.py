@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field, fields, is_dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -344,10 +344,8 @@ class Mechanism(Record):
 
 #: Attributes that nothing is computed from.
 ASIDE = frozenset(
-    (
-        *("doc", "docs", "latex", "lines", "written_paths", "place", "graph", "functions", "file", "requirements"),
-        *("presentation", "limits_told", "of_velocities"),
-    )
+    "doc docs latex lines written_paths place graph functions file requirements presentation limits_told "
+    "of_velocities".split()
 )
 
 
@@ -410,8 +408,8 @@ def _spell(value: Any, graph: Graph, known: dict[int, str]) -> Any:
 
 def _fields(value: Any) -> dict[str, Any]:
     """The attributes of an object; of a dataclass its fields alone, as others may have been looked up since."""
-    if (declared := getattr(value, "__dataclass_fields__", None)) is not None:
-        return {name: getattr(value, name) for name in declared}
+    if is_dataclass(value):
+        return {one.name: getattr(value, one.name) for one in fields(value)}
     slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
     result = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
     return {**result, **getattr(value, "__dict__", {})}

@@ -96,12 +96,6 @@ class Profile(Record):
 CAM_ANGLE = "theta"
 
 
-def _polar(cam: Marker, contour: Profile, follower: Marker, face: bool = False) -> Contour:
-    """The contour r(theta) about the axis of a cam, and the marker that is held to it."""
-    a, r = contour.local, contour.expression
-    return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi, follower, face)
-
-
 class CamLift(Constraint):
     """The follower's coordinate is a given function of the cam's: s = lift(theta - phase)."""
 
@@ -122,18 +116,26 @@ class CamLift(Constraint):
         return [Condition("lift", self.follower - self.lift.at(self.cam - self.phase), self.kind)]
 
 
-class KnifeContact(Constraint):
-    """The follower marker's origin lies on the contour: |p| = r(theta of p), p in the cam's axes."""
+class OnContour(Constraint):
+    """A follower that is held to the contour r(theta) about the axis of a cam."""
 
-    sentence = "The tip of the follower lies on the contour of the cam."
-    formula = r"|\mathbf{p}| = r(\theta)"
-    type_name = "cam_knife_edge"
+    face = False  #: whether the follower has a flat face across its z axis
     cam: Marker
     follower: Marker
     contour: Profile
 
     def glyphs(self) -> list[Glyph]:
-        return [_polar(self.cam, self.contour, self.follower)]
+        a, r = self.contour.local, self.contour.expression
+        point = (r * cos(a), r * sin(a), a.graph.zero)
+        return [Contour(self.cam, point, a, 0.0, 2.0 * math.pi, self.follower, self.face)]
+
+
+class KnifeContact(OnContour):
+    """The follower marker's origin lies on the contour: |p| = r(theta of p), p in the cam's axes."""
+
+    sentence = "The tip of the follower lies on the contour of the cam."
+    formula = r"|\mathbf{p}| = r(\theta)"
+    type_name = "cam_knife_edge"
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         x, y, _ = view.relative(self.cam, self.follower).position
@@ -168,7 +170,7 @@ class FlatSupport(Constraint):
         return [Condition("contact", n_x * x + n_y * y - self.support.toward(n_x, n_y), "length")]
 
 
-class _Contact(Constraint):
+class _Contact(OnContour):
     """Contact at a point of the contour whose polar angle is unknown: ``angle``, the turn of marker ``point``.
 
     ``point`` is fixed to a body without mass that turns about the cam's axis by that angle.
@@ -176,14 +178,8 @@ class _Contact(Constraint):
 
     sentence = r"The follower touches the contour of the cam at the polar angle $\theta$."
     formula = r"\mathbf{p} = r(\theta) \mathbf{e}_r"
-    cam: Marker
-    follower: Marker
-    contour: Profile
     point: Marker
     angle: Expr
-
-    def glyphs(self) -> list[Glyph]:
-        return [_polar(self.cam, self.contour, self.follower)]
 
     def polar(self, view: ConstraintView) -> tuple[Expr, Expr, Frame]:
         """r, r' and the follower's marker in the axes (e_r, e_theta, axis) of the contact point."""
@@ -229,9 +225,7 @@ class FlatContact(_Contact):
     """
 
     type_name = "cam_flat_face"
-
-    def glyphs(self) -> list[Glyph]:
-        return [_polar(self.cam, self.contour, self.follower, face=True)]
+    face = True
 
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.rotation[0][2], follower.rotation[1][2]

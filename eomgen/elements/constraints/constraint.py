@@ -158,9 +158,7 @@ class Linear(Constraint):
     kind: str
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
-        total = -self.offset
-        for coordinate, factor in self.terms:
-            total = total + factor * coordinate
+        total = sum((factor * coordinate for coordinate, factor in self.terms), -self.offset)
         return [Condition("relation", total, self.kind)]
 
 
@@ -204,7 +202,7 @@ def _equation(e: Entry) -> Equation | None:
     moving = [meant for meant in used.values() if meant.level is not None]
     rates = [name for name, meant in used.items() if meant.level == 1]
     if not moving and not e.at_fault("equation"):
-        remedy = f"coordinates are: {', '.join(e.known('coordinate'))}"
+        remedy = f"coordinates are: {', '.join(e.reader.names.of('coordinate'))}"
         e.fault("equation", "the equation contains no coordinate", remedy, "EG-EXPRESSION")
     if {*rates} & symbols_of(gradient(expression, [e.graph.symbol(name) for name in rates])):
         message = f"the equation is not linear in {', '.join(rates)}"

@@ -94,10 +94,6 @@ def _wheels(e: Entry) -> tuple[Expr, Expr, Expr] | None:
     return e.symbol(pair[0]), e.symbol(pair[1]), ratio if opposite else -ratio
 
 
-def _check_pulleys(e: Entry, values: dict[str, Any]) -> None:
-    values["radius"] = (e["radii"] or [None])[0]
-
-
 def _check_carrier(e: Entry, values: dict[str, Any]) -> None:
     if values["pinion"] is not None and values["rack"] is not None:
         e.require_one_carrier("", values["pinion"], values["rack"])
@@ -130,7 +126,7 @@ TYPES = switchable(
         "belt",
         "a belt without slip on two pulleys: r_a (a - phase) = r_b b, or -r_b b if the belt crosses.",
         Where({**_SIZES, "crossed": _CROSSED}, _wheels, one_of=("radii", "teeth")),
-        check=_check_pulleys,
+        check=lambda e, values: values.update(radius=(e["radii"] or [None])[0]),
     ),
 )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Any
 
 from ...base.value_rules import POSITIVE, SUPPORT
 from ...expr import vectors as vec
@@ -250,10 +249,6 @@ def _rolling(e: Entry) -> Constraint | None:
     return RollingConvex(e.name, wheel, plane, ellipsoid_support(local, semi_axes), local)
 
 
-def _check_blade(e: Entry, values: dict[str, Any]) -> None:
-    on_two_bodies(e, "on", values["marker"], values["on"])
-
-
 TYPES = switchable(
     ElementType(
         "rolling",
@@ -281,6 +276,6 @@ TYPES = switchable(
         KnifeEdge,
         "knife_edge",
         "a blade: a marker that cannot move sideways, along one of its own axes.",
-        check=_check_blade,
+        check=lambda e, values: on_two_bodies(e, "on", values["marker"], values["on"]),
     ),
 )

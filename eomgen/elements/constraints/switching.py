@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ...expr import vectors as vec
 from ...expr.core import Expr
 from ..element_type import ElementType, Entry, Where, element, key
@@ -68,10 +66,6 @@ def _pair(e: Entry) -> tuple[Marker, Marker] | None:
     return pair if pair is not None and on_two_bodies(e, "between", *pair) else None
 
 
-def _check_turning(e: Entry, values: dict[str, Any]) -> None:
-    values["turning"] = values["turning"].removeprefix("none")
-
-
 def _lock(e: Entry) -> Constraint | None:
     velocities = e.velocities("joint")
     _require_switch(e, "use a joint of type weld")
@@ -84,7 +78,7 @@ TYPES = switchable(
         "hold",
         "a marker fixed on another body at its place of closing: a foot on the ground, a grasp, a clutch.",
         Where({"between": Pair("marker of the holding body, and the marker that it holds", required=True)}, _pair),
-        check=_check_turning,
+        check=lambda e, values: values.update(turning=values["turning"].removeprefix("none")),
     ),
     ElementType(
         "lock",

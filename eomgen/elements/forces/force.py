@@ -78,6 +78,13 @@ class CoordinateLoad(NamedTuple):
 Load = MarkerLoad | CoordinateLoad
 
 
+def with_reaction(view: View, marker: Marker, base: Marker, force: Vec3, torque: Vec3) -> list[Load]:
+    """A wrench at a marker, and the opposite wrench on the body of another one."""
+    reach = vec.sub(view.position(marker), view.position(base))
+    back = vec.neg(vec.add(torque, vec.cross(reach, force)))
+    return [MarkerLoad(marker, force, torque), MarkerLoad(base, vec.neg(force), back)]
+
+
 def power_of(view: View, loads: Sequence[Load]) -> Expr:
     """Power of loads (W)."""
     total = view.graph.zero
@@ -112,6 +119,8 @@ class Force(Element):
     uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
     by_reaction: ClassVar[bool] = False  #: whether its law speaks of the reactions of joints
     by_power: ClassVar[bool] = False  #: whether its forces enter by virtual power, though it has a potential
+    acts_along = False  #: whether it acts along a path, so that :meth:`measured` is something
+    is_rigid = False  #: whether it is a contact without a law of force, which only a time-stepping method solves
     not_finite_where: ClassVar[str] = ""  #: where its loads are not finite, and what to do, for messages
     name: str
 
@@ -141,23 +150,9 @@ class Force(Element):
         """Its law in LaTeX: that of its laws, or of its type."""
         return [law.formula for law in self.laws] or [self.formula] * bool(self.formula)
 
-    @property
-    def acts_along(self) -> bool:
-        """Whether it acts along a path, so that :meth:`measured` is something."""
-        return hasattr(self, "path")
-
-    def along(self, value: Expr, rate: Expr) -> Expr | None:
-        """The force along its path at a value and a rate of it; None of an element that has no path."""
-        return self.push(value, rate)
-
     def measured(self, view: View) -> Measured | None:
         """What it does along its path, for outputs and laws; None of an element that has no path."""
-        path: Any = getattr(self, "path", None)
-        if path is None:
-            return None
-        value, rate = path.measure(view)
-        force = self.along(value, rate)
-        return None if force is None else Measured(value, rate, force)
+        return None
 
     def power(self, view: View) -> Expr:
         """Power of its loads (W): positive where it drives the mechanism."""
@@ -167,8 +162,8 @@ class Force(Element):
         """Rates of its states, in the order in which its type names them."""
         return ()
 
-    def met_shapes(self) -> list[str]:
-        """What may meet, of a force that acts between many shapes."""
+    def met_shapes(self) -> list[tuple[str, int]]:
+        """What may meet, of a force that acts between many shapes, and the body of each."""
         return []
 
     def meeting(self, view: MovingView) -> list[Expr]:
@@ -178,16 +173,6 @@ class Force(Element):
     def near(self, view: View) -> list[Expr]:
         """Of a force that acts between shapes: which are near each other, and where."""
         return []
-
-    @property
-    def met_bodies(self) -> list[int]:
-        """The body of each of :meth:`met_shapes`."""
-        return []
-
-    @property
-    def is_rigid(self) -> bool:
-        """Whether it is a contact without a law of force, which only a time-stepping method solves."""
-        return False
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

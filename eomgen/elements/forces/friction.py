@@ -186,10 +186,10 @@ class LuGre(LineFriction):
 
     def in_plane(self, slip: Slip) -> Vec3:
         """Of states in the axes of the first surface; those along the normal have no effect."""
-        damped, power, loss = self._damping(slip)
+        _, bent, _, give, damped, power, loss = self._bristles(slip)
         gains = power.graph.apply("lt", loss + power, 0.0)
         damped = vec.scale(where(gains, -loss / where(gains, power, 1.0), 1.0), damped)
-        bristles = vec.scale(1.0 / self._give(slip), vec.add(self._bent(slip), damped))
+        bristles = vec.scale(1.0 / give, vec.add(bent, damped))
         return vec.add(bristles, vec.scale(self.viscous, slip.velocity))
 
     def rates_in_plane(self, slip: Slip) -> tuple[Expr, ...]:
@@ -199,15 +199,13 @@ class LuGre(LineFriction):
 
     def sums(self, slip: Slip) -> tuple[Expr, ...]:
         """What one of several places of contact adds: m v, the decay times N, N, and the decay that damping needs."""
-        push = _pressing(slip)
+        graph, (push, bent, decay, give, _, power, _) = slip.push.graph, self._bristles(slip)
         velocity = vec.transpose_times(slip.axes_of_states(self.lateral), slip.velocity)
-        drive = push / self._give(slip)
-        decay, bent = self._decay_in_plane(slip), self._bent(slip)
-        power = self._damping(slip)[1]
-        stored = vec.dot(bent, bent)
-        gives = push.graph.apply("lt", power, 0.0)  # only bent bristles do
-        needed = where(gives, push.graph.apply("min", decay, -power / where(gives, stored, 1.0)), 0.0)
-        return (*(drive * v for v, _ in zip(velocity, self.deflections, strict=False)), push * decay, push, needed)
+        gives = graph.apply("lt", power, 0.0)  # only bent bristles do
+        stored = where(gives, vec.dot(bent, bent), 1.0)
+        needed = where(gives, graph.apply("min", decay, -power / stored), 0.0)
+        drive = (push / give * v for v, _ in zip(velocity, self.deflections, strict=False))
+        return (*drive, push * decay, push, needed)
 
     def rates_of(self, sums: Sequence[Expr]) -> tuple[Expr, ...]:
         """Rates from what all places of contact add; the decay is the mean of theirs by their normal forces.
@@ -236,32 +234,22 @@ class LuGre(LineFriction):
     def _decay(self, squared: Expr, speed: Expr) -> Expr:
         return self.stiffness * speed / stribeck_level(squared, self.dynamic, self.static, self.stribeck)
 
-    def _decay_in_plane(self, slip: Slip) -> Expr:
-        return self._decay(vec.dot(slip.velocity, slip.velocity), _size(slip.velocity))
+    def _bristles(self, slip: Slip) -> tuple[Expr, Vec3, Expr, Expr, Vec3, Expr, Expr]:
+        """In a contact: the normal force where it presses, the state, its decay, and what it is divided by.
 
-    def _damping(self, slip: Slip) -> tuple[Vec3, Expr, Expr]:
-        """damping / stiffness e', its power, and what the decay and viscous friction take."""
-        push, bent, decay = _pressing(slip), self._bent(slip), self._decay_in_plane(slip)
-        drive = push / self._give(slip)
-        change = vec.sub(vec.scale(drive, slip.velocity), vec.scale(decay, bent))
-        damped = vec.scale(self.damping / self.stiffness, change)
-        viscous = self.viscous * push * vec.dot(slip.velocity, slip.velocity)
-        return damped, drive * vec.dot(damped, slip.velocity), decay * vec.dot(bent, bent) + viscous
-
-    def _bent(self, slip: Slip) -> Vec3:
-        return slip.across(self.deflections, self.lateral)
-
-    def _give(self, slip: Slip) -> Expr:
-        """What the state is divided by: sqrt(N / stiffness), or more where the normal force does not hold it."""
-        graph = slip.push.graph
-        pressed = graph.apply("lt", 0.0, slip.push)
+        That is sqrt(N / stiffness), or more where the normal force does not hold it.  Then damping / stiffness e', its
+        power, and what the decay and viscous friction take.
+        """
+        graph, v, squared = slip.push.graph, slip.velocity, vec.dot(slip.velocity, slip.velocity)
+        push, bent = graph.apply("max", 0.0, slip.push), slip.across(self.deflections, self.lateral)
+        decay = self._decay(squared, _size(v))
         most = self.dynamic if self.static is None else graph.apply("max", self.dynamic, self.static)
-        root = sqrt(where(pressed, slip.push, 1.0) / self.stiffness)
-        return graph.apply("max", root, _size(self._bent(slip)) / most)
-
-
-def _pressing(slip: Slip) -> Expr:
-    return slip.push.graph.apply("max", 0.0, slip.push)
+        root = sqrt(where(graph.apply("lt", 0.0, slip.push), slip.push, 1.0) / self.stiffness)
+        give = graph.apply("max", root, _size(bent) / most)
+        change = vec.sub(vec.scale(push / give, v), vec.scale(decay, bent))
+        damped = vec.scale(self.damping / self.stiffness, change)
+        loss = decay * vec.dot(bent, bent) + self.viscous * push * squared
+        return push, bent, decay, give, damped, push / give * vec.dot(damped, v), loss
 
 
 def _size(x: Vec3) -> Expr:
@@ -482,8 +470,7 @@ def read_reaction_friction(e: Entry, path: Path | None, viscous: Expr | None) ->
     if "smoothing" not in e.values:
         e.missing("smoothing", "give the velocity (greater than 0) below which friction is smoothed")
         return None
-    raw = [e[one] for one in ("coefficient", "static_coefficient", "coulomb", "static")]
-    coefficient, onset, preload, breakaway = raw
+    coefficient, onset, preload, breakaway = (e[x] for x in ("coefficient", "static_coefficient", "coulomb", "static"))
     if ("stribeck" in e.values) != (onset is not None or breakaway is not None):
         message = "is missing" if "stribeck" not in e.values else "is given without static_coefficient or static"
         remedy = "give stribeck together with static_coefficient or static, or none of them"
@@ -542,7 +529,7 @@ class JointFriction(PathForce):
 
 #: Keys of laws of friction -> those of friction in a joint, which are forces or torques.
 _IN_JOINT = {
-    **dict.fromkeys(("static", "stribeck", "smoothing", "viscous", "transition")),
+    **{key: key for key in ("static", "stribeck", "smoothing", "viscous", "transition")},
     "type": "friction_law",
     "dynamic": "coulomb",
     "stiffness": "bristle_stiffness",
@@ -557,13 +544,12 @@ def _joint_friction(e: Entry) -> Force | None:
     for one in BY_REACTION:
         if one in e.values:
             e.fault(one, "is given without coefficient", f"give coefficient, or leave {one} out", "EG-MISSING")
-    names = {key: name or key for key, name in _IN_JOINT.items()}
-    values = {key: e.values[name] for key, name in names.items() if name in e.values}
+    values = {key: e.values[name] for key, name in _IN_JOINT.items() if name in e.values}
     if "coulomb" not in e.values:
-        for one in [names[key] for key in values if key != "viscous"]:
+        for one in [_IN_JOINT[key] for key in values if key != "viscous"]:
             e.fault(one, "is given without coulomb", f"give coulomb, or leave {one} out", "EG-MISSING")
     else:
-        law = e.as_law(FRICTION, e["friction_law"], values, e.path, names)
+        law = e.as_law(FRICTION, e["friction_law"], values, e.path, _IN_JOINT)
         dry = law.element_type.read(law)
         return None if path is None or dry is None else JointFriction(e.name, path, dry)
     if viscous is None and not e.at_fault():

@@ -262,10 +262,6 @@ def _dissipation(e: Entry, value: Expr | None) -> Expr:
     return dissipation_of(restitution, velocity, formula) if known else e.graph.zero
 
 
-def _check_dissipation(e: Entry, values: dict[str, Any]) -> None:
-    values["dissipation"] = _dissipation(e, values["dissipation"])
-
-
 def _hertz(e: Entry) -> HuntCrossley | None:
     """Of a stiffness, or of the moduli of both bodies."""
     exponent, dissipation = e.graph.constant(EXPONENT), _dissipation(e, e["dissipation"])
@@ -300,7 +296,7 @@ _LAWS = table(
         "hunt_crossley",
         "k d**n max(0, 1 + dissipation d_dot) of the penetration d.",
         more=IMPACT,
-        check=_check_dissipation,
+        check=lambda e, values: values.update(dissipation=_dissipation(e, values["dissipation"])),
         remedies=_REMEDIES,
     ),
     _hertz_law({}),
@@ -349,10 +345,7 @@ class JointStop(PathForce):
 
     def _sum(self, value: Expr, rate: Expr, part: Callable[[Expr, Expr, float], Expr]) -> Expr:
         """A part of what the law gives, of both stops."""
-        total = value.graph.zero
-        for one in self._depths(value, rate):
-            total = total + part(*one)
-        return total
+        return sum((part(*one) for one in self._depths(value, rate)), value.graph.zero)
 
     def along(self, value: Expr, rate: Expr) -> Expr:
         return self._sum(value, rate, lambda depth, change, sense: sense * self.law.force(depth, change))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from ..element_type import Entry, Where
 from ..frames import Marker, WrapCylinder
 from ..glyphs import Drawn, Points
 from ..kinds import JointReference, Pair, Via
-from .force import CoordinateLoad, Force, Load, MarkerLoad, View, power_of, where
+from .force import CoordinateLoad, Force, Load, MarkerLoad, Measured, View, power_of, where
 
 # -- paths -------------------------------------------------------------------------------------------------------------
 
@@ -54,7 +55,8 @@ class Line(Path):
         """From start to end, ground axes (m)."""
         return vec.sub(view.position(self.end), view.position(self.start))
 
-    def _geometry(self, view: View) -> tuple[Vec3, Expr]:
+    def geometry(self, view: View) -> tuple[Vec3, Expr]:
+        """The unit vector from start to end, ground axes, and the distance."""
         d = self.reach(view)
         length = sqrt(vec.dot(d, d))
         return (d[0] / length, d[1] / length, d[2] / length), length
@@ -63,12 +65,12 @@ class Line(Path):
         return Drawn((self.start, self.end), along=along)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        direction, length = self._geometry(view)
+        direction, length = self.geometry(view)
         relative = vec.sub(view.velocity(self.end), view.velocity(self.start))
         return length, vec.dot(direction, relative)
 
     def loads(self, view: View, force: Expr) -> list[Load]:
-        direction, _ = self._geometry(view)
+        direction, _ = self.geometry(view)
         return self.pair(view, vec.scale(force, direction))
 
     def pair(self, view: View, push: Vec3) -> list[Load]:
@@ -90,8 +92,7 @@ class Turn(Path):
         return Drawn((self.start,), about=about)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        angle, rate, _ = view.turn(self.start, self.end)
-        return angle, rate
+        return view.turn(self.start, self.end)[:2]
 
     def is_exact(self, view: View) -> bool:
         return view.turn(self.start, self.end)[2]
@@ -150,6 +151,16 @@ class PathForce(Force):
     """A force along a path: :meth:`along` says how large it is at a value and a rate of the path."""
 
     path: Path
+    acts_along = True
+
+    def along(self, value: Expr, rate: Expr) -> Expr | None:
+        """The force along its path at a value and a rate of it."""
+        return self.push(value, rate)
+
+    def measured(self, view: View) -> Measured | None:
+        value, rate = self.path.measure(view)
+        force = self.along(value, rate)
+        return None if force is None else Measured(value, rate, force)
 
     def loads(self, view: View) -> list[Load]:
         value, rate = self.path.measure(view)
@@ -158,9 +169,6 @@ class PathForce(Force):
 
 
 # -- paths over via points and cylinders -------------------------------------------------------------------------------
-
-
-PI = 3.141592653589793
 
 
 class Piece(NamedTuple):
@@ -200,9 +208,7 @@ class Route(Path):
         return Drawn((self.start, *self.via, self.end))
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        length = view.graph.zero
-        for _, _, _, piece in self._pieces(view):
-            length = length + piece.length
+        length = sum((piece.length for _, _, _, piece in self._pieces(view)), view.graph.zero)
         return length, power_of(view, self._smooth(view, view.graph.one))  # of a unit force: the rate
 
     def is_exact(self, view: View) -> bool:
@@ -269,9 +275,7 @@ def _scaled(force: Expr, loads: Sequence[MarkerLoad]) -> list[MarkerLoad]:
 
 
 def _straight(view: View, start: Marker, end: Marker) -> Piece:
-    reach = Line(start, end).reach(view)
-    length = sqrt(vec.dot(reach, reach))
-    direction = (reach[0] / length, reach[1] / length, reach[2] / length)
+    direction, length = Line(start, end).geometry(view)
     o = vec.zero(view.graph)
     return Piece(length, direction, direction, o, o, (o, o), view.graph.zero)
 
@@ -291,7 +295,7 @@ def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece
     # angle from start to end about the axis in the sense of the path, 0 to 2 pi, less those from the ends to where the
     # tangents touch
     cross, dot = s * (a[0] * b[1] - a[1] * b[0]), a[0] * b[0] + a[1] * b[1]
-    w = PI + atan2(-cross, -dot) - atan2(t_a, r) - atan2(t_b, r)
+    w = math.pi + atan2(-cross, -dot) - atan2(t_a, r) - atan2(t_b, r)
     arc = t_a + r * w + t_b
     h = b[2] - a[2]
     length = sqrt(arc * arc + h * h)

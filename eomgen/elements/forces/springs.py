@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
@@ -28,24 +28,10 @@ from ..glyphs import (
     Glyph,
     Pull,
 )
-from ..kinds import LAW, BodyName, Choice, Fields, MarkerReference, Matrix6, Scalar, Value, Vector
+from ..kinds import LAW, BodyName, Choice, MarkerReference, Matrix6, Scalar, Value, Vector
 from ..scalars import dot
-from .force import Force, Load, MarkerLoad, View
-from .paths import (
-    ANGLE,
-    ANYWHERE,
-    BETWEEN,
-    COORDINATE,
-    LINE,
-    ON_JOINT,
-    VIA,
-    Line,
-    Path,
-    PathForce,
-    read_angle,
-    read_coordinate,
-    read_joint_or_path,
-)
+from .force import Force, Load, MarkerLoad, View, with_reaction
+from .paths import ANGLE, ANYWHERE, BETWEEN, COORDINATE, LINE, ON_JOINT, Line, PathForce, read_coordinate
 
 
 class Actuator(PathForce):
@@ -257,9 +243,6 @@ class GeneralElement(PathForce):
     law: Expr
     energy: Expr
 
-    def _here(self, view: View, expression: Expr) -> Expr:
-        return self._at(*self.path.measure(view), expression)
-
     def _at(self, value: Expr, rate: Expr, expression: Expr) -> Expr:
         return substitute([expression], {self.value: value, self.rate: rate})[0]
 
@@ -273,34 +256,29 @@ class GeneralElement(PathForce):
     def potential(self, view: View) -> Expr | None:
         if self.energy.is_zero or not self.path.is_exact(view):
             return None
-        return self._here(view, self.energy)
+        return self._at(*self.path.measure(view), self.energy)
 
     def remainder(self, view: View) -> list[Load]:
-        return [] if self.law.is_zero else self.path.loads(view, self._here(view, self.law))
+        return [] if self.law.is_zero else self.path.loads(view, self._at(*self.path.measure(view), self.law))
 
 
-def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], GeneralElement | None]:
-    """The law knows ``length`` or ``angle``, and ``rate``."""
+def _element(name: str, doc: str, where: Where, of: str, unit: str, push: Dimension, rate: Dimension) -> ElementType:
+    """A type whose law knows ``length`` or ``angle``, and ``rate``: of what, in what unit, and the dimensions."""
 
     def read(e: Entry) -> GeneralElement | None:
-        where = path(e)
+        path = where.read(e)
         if "law" not in e.values and "potential" not in e.values:
             e.fault("", "has no force law", "give law, potential or both", "EG-MISSING")
-        on = e["joint"] if "joint" in e.values and where is not None else None
-        word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
-        value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
-        law = e.law("law", {word: value, "rate": rate}) if "law" in e.values else e.graph.zero
-        energy = e.law("potential", {word: value}) if "potential" in e.values else e.graph.zero
-        return None if where is None else GeneralElement(e.name, where, value, rate, law, energy)
+        on = e["joint"] if "joint" in e.values and path is not None else None
+        word = "angle" if where is ANGLE or (on is not None and on.kind == "angle") else "length"
+        s, s_dot = (e.graph.symbol(f"{one}[{e.name}]") for one in (word, "rate"))
+        law = e.law("law", {word: s, "rate": s_dot}) if "law" in e.values else e.graph.zero
+        energy = e.law("potential", {word: s}) if "potential" in e.values else e.graph.zero
+        return None if path is None else GeneralElement(e.name, path, s, s_dot, law, energy)
 
-    return read
-
-
-def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
-    """Keys of a law of ``of``, its dimension and that of ``rate``."""
     local = {"length": LENGTH, "angle": NONE, "rate": rate}
     names = {name: Scalar("", dimension=dimension) for name, dimension in local.items()}
-    return {
+    keys = {
         "law": Scalar(
             f"{unit}: a positive value increases the coordinate or pushes the markers apart; an expression of {of}, "
             "``rate``, t, parameters, inputs, coordinates, velocities, the motion of markers and outputs",
@@ -314,27 +292,21 @@ def _law(of: str, unit: str, push: Dimension, rate: Dimension) -> Fields:
             local=names,
         ),
     }
+    return ElementType(name, doc, {**where.keys, **keys, **where.behind}, read, one_of=where.one_of)
 
 
 TYPES |= table(
-    ElementType(
+    _element(
         "element",
         "a force with a law of your own: along a joint's coordinate, the line between two markers, or a path.",
-        {
-            "joint": ON_JOINT,
-            "between": BETWEEN,
-            **_law("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)", PUSH, RATE),
-            "via": VIA,
-        },
-        _element(read_joint_or_path, False),
-        one_of=("joint", "between"),
+        ANYWHERE,
+        *("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)", PUSH, RATE),
     ),
-    ElementType(
+    _element(
         "torsional_element",
         "a torque with a law of your own on an angle: of a joint, or of the second marker about z of the first.",
-        {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)", ENERGY, SPIN)},
-        _element(read_angle, True),
-        one_of=("joint", "between"),
+        ANGLE,
+        *("``angle``", "torque (N m)", ENERGY, SPIN),
     ),
 )
 
@@ -387,10 +359,7 @@ class Bushing(Force):
 
     def potential(self, view: View) -> Expr | None:
         y = self._displacements(view)
-        total = view.graph.zero
-        for a, b in zip(y, _times(self.stiffness, y), strict=True):
-            total = total + a * b
-        return 0.5 * total
+        return 0.5 * dot(y, _times(self.stiffness, y))  # type: ignore[no-any-return]
 
     def remainder(self, view: View) -> list[Load]:
         if all(entry.is_zero for row in self.damping for entry in row):
@@ -443,9 +412,7 @@ class Bushing(Force):
         axes = view.rotation(self.first)
         push = vec.times(axes, force)
         turn = vec.times(axes, vec.add(vec.scale(e0, moments), vec.cross(e, moments)))
-        reach = vec.sub(view.position(self.second), view.position(self.first))
-        back = vec.neg(vec.add(turn, vec.cross(reach, push)))
-        return [MarkerLoad(self.second, push, turn), MarkerLoad(self.first, vec.neg(push), back)]
+        return with_reaction(view, self.second, self.first, push, turn)
 
 
 def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
@@ -504,11 +471,6 @@ class PointGravity(Force):
     mass: Expr
     inertia: Mat3 | None = None
 
-    def _reach(self, view: View) -> tuple[Vec3, Expr, Vec3]:
-        d = vec.sub(view.position(self.body), view.position(self.center))
-        r = sqrt(vec.dot(d, d))
-        return d, r, (d[0] / r, d[1] / r, d[2] / r)
-
     def _second(self, view: View, u: Vec3) -> tuple[Vec3, Expr, Expr]:
         """I u in ground axes, u . I u, tr I."""
         assert self.inertia is not None
@@ -517,19 +479,18 @@ class PointGravity(Force):
         return bent, vec.dot(u, bent), self.inertia[0][0] + self.inertia[1][1] + self.inertia[2][2]
 
     def loads(self, view: View) -> list[Load]:
-        d, r, u = self._reach(view)
-        force = vec.scale(-self.mu * self.mass / (r * r), u)
-        torque = back = vec.zero(view.graph)
-        if self.inertia is not None:
-            bent, along, trace = self._second(view, u)
-            extra = vec.add(vec.scale(trace - 5.0 * along, u), vec.scale(view.graph.lift(2.0), bent))
-            force = vec.sub(force, vec.scale(1.5 * self.mu / r**4, extra))
-            torque = vec.scale(3.0 * self.mu / r**3, vec.cross(u, bent))
-            back = vec.neg(vec.add(torque, vec.cross(d, force)))  # the pair has no resultant moment
-        return [MarkerLoad(self.body, force, torque), MarkerLoad(self.center, vec.neg(force), back)]
+        u, r = Line(self.center, self.body).geometry(view)
+        force, o = vec.scale(-self.mu * self.mass / (r * r), u), vec.zero(view.graph)
+        if self.inertia is None:
+            return [MarkerLoad(self.body, force, o), MarkerLoad(self.center, vec.neg(force), o)]
+        bent, along, trace = self._second(view, u)
+        extra = vec.add(vec.scale(trace - 5.0 * along, u), vec.scale(view.graph.lift(2.0), bent))
+        force = vec.sub(force, vec.scale(1.5 * self.mu / r**4, extra))
+        torque = vec.scale(3.0 * self.mu / r**3, vec.cross(u, bent))
+        return with_reaction(view, self.body, self.center, force, torque)
 
     def potential(self, view: View) -> Expr | None:
-        _, r, u = self._reach(view)
+        u, r = Line(self.center, self.body).geometry(view)
         energy = -self.mu * self.mass / r
         if self.inertia is not None:
             _, along, trace = self._second(view, u)

@@ -18,7 +18,7 @@ from ..element_type import Entry, Where, element, key, keys_of, table
 from ..frames import Marker, velocity_at
 from ..glyphs import PLANE, Drawn, Glyph, Wheel
 from ..kinds import LAW, Axis, Choice, Flag, Pair, Radii, Scalar
-from .force import Force, Load, MarkerLoad, Measured, View, beyond_zero, where
+from .force import Force, Load, MarkerLoad, Measured, View, beyond_zero, where, with_reaction
 from .normal_laws import DampedLinear
 
 LAWS = ("linear", "vermeulen_johnson", "polach")
@@ -433,6 +433,7 @@ class Tyre(Force):
         )
     )  # fmt: skip
     deflections: tuple[Expr, ...] = ()
+    acts_along = True
 
     @property
     def load_law(self) -> DampedLinear:
@@ -442,10 +443,6 @@ class Tyre(Force):
     @property
     def laws(self) -> tuple[Any, ...]:
         return (self.load_law, self.law)
-
-    @property
-    def acts_along(self) -> bool:
-        return True
 
     def glyphs(self) -> list[Glyph]:
         return [Drawn((self.road,), about=PLANE), Wheel(self.wheel, self.radius)]
@@ -492,15 +489,17 @@ class Tyre(Force):
             vec.dot(lateral, velocity),
         )
 
-    def _slips(self, way: _WheelMotion) -> tuple[Expr, Expr]:
-        """Longitudinal slip and tangent of the slip angle of the law."""
-        speed, (x, y), (u, v) = way.depth.graph.apply("abs", way.forward), self.relaxation, self.deflections
+    def _slips(self, way: _WheelMotion) -> Slips:
+        """Those of the law."""
+        graph = way.depth.graph
+        speed, (x, y), (u, v) = graph.apply("abs", way.forward), self.relaxation, self.deflections
 
         def slip(deflection: Expr, velocity: Expr, length: Expr) -> Expr:
             tau = self.settling / (1.0 + speed * self.settling / length)
             return (deflection + tau * velocity) / length
 
-        return slip(u, way.forward - way.rolling, x), slip(v, way.sideways, y)
+        along, across = slip(u, way.forward - way.rolling, x), slip(v, way.sideways, y)
+        return Slips(along, across, way.camber, graph.apply("tanh", way.forward / self.reversal))
 
     def loads(self, view: View) -> list[Load]:
         return self._loads(view, True)
@@ -515,7 +514,7 @@ class Tyre(Force):
         way = self._rolling(view)
         load = self.load_law.force(way.depth, way.rate)
         push = load if whole else load - self.load_law.elastic(way.depth)
-        slips = Slips(*self._slips(way), way.camber, view.graph.apply("tanh", way.forward / self.reversal))
+        slips = self._slips(way)
         bears = view.graph.apply("lt", 0.0, load)
         result = self.law.forces(slips, where(bears, load, 1.0))
         along, lateral, moment, drag = TyreForces(*(where(bears, one, 0.0) for one in result))
@@ -525,11 +524,7 @@ class Tyre(Force):
         turn = vec.add(vec.scale(moment, way.normal), vec.scale(lag / way.upright, way.across))
         force = vec.add(pressing, sliding)
         torque = vec.add(vec.add(vec.cross(way.lowest, pressing), vec.cross(way.patch, sliding)), turn)
-        reach = vec.sub(view.position(self.wheel), view.position(self.road))
-        return [
-            MarkerLoad(self.wheel, force, torque),
-            MarkerLoad(self.road, vec.neg(force), vec.neg(vec.add(torque, vec.cross(reach, force)))),
-        ]
+        return with_reaction(view, self.wheel, self.road, force, torque)
 
     def state_rates(self, view: View) -> tuple[Expr, ...]:
         way, graph = self._rolling(view), view.graph
@@ -539,26 +534,24 @@ class Tyre(Force):
         bears = graph.apply("lt", 0.0, load)
         off = speed + graph.apply("abs", way.rolling)
         slips = self._slips(way)
-        moved = [v - speed * slip for v, slip in zip((way.forward - way.rolling, way.sideways), slips, strict=True)]
-        turned = Slips(*slips, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        moved = way.forward - way.rolling - speed * slips.along, way.sideways - speed * slips.across
         vertical = where(bears, load, 1.0)
-        slides = self.law.slides(turned, vertical)
-        taken = self._shares(way, vertical)
-        rates, unwound = taken(*moved), taken(*slips)
-        growth = slips[0] * rates[0] / x + slips[1] * rates[1] / y
-        weight = slips[0] * unwound[0] / x + slips[1] * unwound[1] / y
+        slides = self.law.slides(slips, vertical)
+        taken = self._shares(slips, vertical)
+        rates, unwound = taken(*moved), taken(slips.along, slips.across)
+        growth = slips.along * rates[0] / x + slips.across * rates[1] / y
+        weight = slips.along * unwound[0] / x + slips.across * unwound[1] / y
         grows = where(graph.apply("lt", 0.0, weight), graph.apply("lt", 0.0, growth), 0.0)
         lost = where(slides, where(grows, growth / where(grows, weight, 1.0), 0.0), 0.0)
-        result = [
+        return tuple(
             where(bears, rate - lost * back, -off / length * deflection)
             for rate, back, deflection, length in zip(rates, unwound, (u, v), (x, y), strict=True)
-        ]
-        return tuple(result)
+        )
 
-    def _shares(self, way: _WheelMotion, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
+    def _shares(self, slips: Slips, load: Expr) -> Callable[[Expr, Expr], tuple[Expr, Expr]]:
         """Rates of the deflections of the motion that the tyre takes up: of a tread beside the rest of a carcass."""
         (u, v), (x, y), graph = self.deflections, self.relaxation, load.graph
-        limited = Slips(u / x, v / y, way.camber, graph.apply("tanh", way.forward / self.reversal))
+        limited = slips._replace(along=u / x, across=v / y)
         result = None if (y - x).is_zero else self.law.gradients(limited, load)
         if result is None:
             return lambda along, across: (along, across)
