@@ -397,7 +397,7 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
     values = {name: 0.37 + 0.61 * ((k * 0.618033988749895) % 1.0) for k, name in enumerate(sorted(used))}
     numbers = [float(x) for x in evaluate(flat, values)]
     size = max((abs(x) for x in numbers if math.isfinite(x)), default=0.0)
-    for i, j in ((i, j) for i in range(len(rows)) for j in range(i)):
+    for i, j in ((a, b) for a in range(len(rows)) for b in range(a)):
         gap = abs(numbers[i * len(rows) + j] - numbers[j * len(rows) + i])
         if gap > TENSOR * size:  # false where an entry is not finite there
             message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"

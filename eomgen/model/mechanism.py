@@ -343,10 +343,10 @@ class Mechanism(Record):
 
 
 #: Attributes that nothing is computed from.
-ASIDE = frozenset(
-    "doc docs latex lines written_paths place graph functions file requirements presentation limits_told "
-    "of_velocities".split()
-)
+ASIDE = {
+    *("doc", "docs", "latex", "lines", "written_paths", "place", "graph", "functions", "file", "requirements"),
+    *("presentation", "limits_told", "of_velocities"),
+}
 
 
 def model_digest(mechanism: Mechanism) -> str:
