@@ -58,12 +58,6 @@ def described(texts: list[str], name: str = "held") -> dict[str, Any]:
     }
 
 
-def load(data: Any, folder: Path) -> eg.Model:
-    """The model of a file that holds the data as JSON, which is YAML."""
-    (folder / "model.yaml").write_text(json.dumps(data))
-    return eg.load(folder / "model.yaml")
-
-
 def printable(text: str) -> bool:
     return all(c.isprintable() or c in "\n\t" for c in text)
 
@@ -198,7 +192,7 @@ def test_a_package_with_every_text_installs_and_runs(tmp_path: Path) -> None:
 
 def test_a_compiled_module_holds_the_texts(tmp_path: Path) -> None:
     texts = [*NASTY.values()]
-    module = load(described(texts), tmp_path).compile(kernels=["rhs", "energy"], optimize=0)
+    module = load(tmp_path, json.dumps(described(texts))).compile(kernels=["rhs", "energy"], optimize=0)
     assert_held(module.metadata, texts)
     assert module.doc == "\n".join(texts)
     assert module.energy(module.x0()).shape == (2,)
@@ -229,7 +223,9 @@ class Tags(html.parser.HTMLParser):
 
 
 def test_what_is_shown_shows_the_texts_and_obeys_none_of_them(tmp_path: Path) -> None:
-    nasty, plain = (load(described(texts), tmp_path) for texts in ([*NASTY.values()], ["plain"] * len(NASTY)))
+    nasty, plain = (
+        load(tmp_path, json.dumps(described(texts))) for texts in ([*NASTY.values()], ["plain"] * len(NASTY))
+    )
     equations, reference = nasty.derive(), plain.derive()
     module = equations.compile(target="numpy", kernels=["rhs"])
     pairs = ((nasty, plain), (module, reference.compile(target="numpy", kernels=["rhs"])), (equations, reference))
@@ -249,7 +245,7 @@ TOGETHER = f"{ALL}\x07\x1b\uffff\u202e\u2066\u200b\ufeff"
 
 @pytest.mark.parametrize("version", ["2.0", pytest.param("3.0", marks=pytest.mark.thorough)])
 def test_a_unit_holds_the_text_in_well_formed_files(version: str, tmp_path: Path) -> None:
-    unit = load(described([TOGETHER]), tmp_path).derive().write_fmu(tmp_path / "unit.fmu", version)
+    unit = load(tmp_path, json.dumps(described([TOGETHER]))).derive().write_fmu(tmp_path / "unit.fmu", version)
     with zipfile.ZipFile(unit) as archive:
         root = ElementTree.fromstring(archive.read("modelDescription.xml"))
         page = archive.read("documentation/index.html").decode()
@@ -262,7 +258,7 @@ def test_a_unit_holds_the_text_in_well_formed_files(version: str, tmp_path: Path
 
 @pytest.mark.filterwarnings("ignore:the mesh")
 def test_documents_and_tables_hold_no_character_that_does_not_print(tmp_path: Path) -> None:
-    equations = load(described([TOGETHER]), tmp_path).derive()
+    equations = load(tmp_path, json.dumps(described([TOGETHER]))).derive()
     for form in ("html", "md", "tex"):
         assert printable(equations.explain("short").save(tmp_path / f"x.{form}").read_text(encoding="utf-8")), form
     run = equations.compile(target="numpy").simulate(0.1)
@@ -274,7 +270,7 @@ def test_documents_and_tables_hold_no_character_that_does_not_print(tmp_path: Pa
 
 def test_a_model_file_that_is_written_reads_back_the_texts(tmp_path: Path) -> None:
     texts = [text for text in NASTY.values() if text]
-    written = load(described(texts), tmp_path).to_yaml()
+    written = load(tmp_path, json.dumps(described(texts))).to_yaml()
     assert printable(written)
     data = YAML(typ="safe", pure=True).load(written)
     assert data["doc"] == "\n".join(texts)
@@ -287,7 +283,7 @@ def test_a_model_file_that_is_written_reads_back_the_texts(tmp_path: Path) -> No
 def test_a_pair_of_surrogates_is_a_character_and_half_of_one_is_refused(tmp_path: Path) -> None:
     for text in LONE.values():
         with refused("EG-FILE-DAMAGED doc") as caught:
-            load(described([text]), tmp_path).check()
+            load(tmp_path, json.dumps(described([text]))).check()
         places = {"doc", "parameters.p0.doc", "inputs.u0.doc", "outputs.y0.doc", "states.z0.doc", "events.e0.doc"}
         assert places | {"bodies.rod.display[0].file"} == {problem.path for problem in caught.value.problems}
         model = eg.Model("held", doc=text)  # in Python as in a file
@@ -296,7 +292,7 @@ def test_a_pair_of_surrogates_is_a_character_and_half_of_one_is_refused(tmp_path
         with pytest.raises(eg.ModelError) as caught:
             model.check()
         assert {problem.path for problem in caught.value.problems} == {"doc", "parameters.l.unit", "parameters.l.doc"}
-    module = load(described([PAIR]), tmp_path).compile(target="numpy", kernels=["rhs"])
+    module = load(tmp_path, json.dumps(described([PAIR]))).compile(target="numpy", kernels=["rhs"])
     assert_held(module.metadata, ["\N{GRINNING FACE}"])
 
 
@@ -304,7 +300,9 @@ def test_pictures_are_whole_and_hold_no_element_of_a_text(tmp_path: Path) -> Non
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    module = load(described(["plain"]), tmp_path).compile(target="numpy", kernels=["rhs", "outputs", "events"])
+    module = load(tmp_path, json.dumps(described(["plain"]))).compile(
+        target="numpy", kernels=["rhs", "outputs", "events"]
+    )
     run = module.simulate(0.05)
     for key in ("HTML", "dollar", "two dollars", "dollars", "LaTeX", "XML", "NUL", "C1", "colours", "HTML comment end"):
         run.units["y0"] = NASTY[key]  # as a stored trajectory may have it
