@@ -104,10 +104,11 @@ class _Code:
             )
         symbols = set().union(*(x.free_symbols for x in whole), {symbol for symbol, _ in named})
         self.renamed = _renamed((str(s) for s in symbols), language.reserved | {"state_rates", "stateRates"}, form)
-        put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols} | {sympy.zoo: sympy.oo}  # 1/0 is infinite
-        self.named = [(put[symbol], x.xreplace(put)) for symbol, x in named]
-        self.mass, self.force = equations.mass_matrix.xreplace(put), equations.force.xreplace(put)
-        self.states = [x.xreplace(put) for x in rates[1]]
+        put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}
+        changed = {**put, sympy.zoo: sympy.oo}  # 1/0 is infinite
+        self.named = [(put[symbol], x.xreplace(changed)) for symbol, x in named]
+        self.mass, self.force = equations.mass_matrix.xreplace(changed), equations.force.xreplace(changed)
+        self.states = [x.xreplace(changed) for x in rates[1]]
         self.state_names = equations.kinematics.state_names
         inner = {symbol for symbol, _ in self.named}
         self.arguments = sorted(str(symbol) for symbol in put.values() if symbol not in inner)
@@ -170,8 +171,9 @@ class _Code:
         arguments = "".join(f"double {name}, " for name in self.arguments)
         more = f", double state_rates[{len(self.states)}]" if self.states else ""
         head = f"void {self.function}({arguments}double M[{n}][{n}], double f[{n}]{more})"
-        body = self._body("  {} = {};", lambda at: "".join(f"[{k}]" for k in at), 0, named="  const double {} = {};")
-        return ["#include <math.h>", head, "{", *body, "}"]
+        body = [*self._body("  {} = {};", lambda at: "".join(f"[{k}]" for k in at), 0, named="  const double {} = {};")]
+        logic = ["#include <stdbool.h>"] * any(re.search(r"\b(true|false)\b", line) for line in body)
+        return ["#include <math.h>", *logic, head, "{", *body, "}"]
 
     def _mathematica(self) -> list[str]:
         return self._statements("{} = {};", "{} = {};", "{{{}}}", "stateRates")

@@ -314,6 +314,7 @@ def test_sympy_and_c_give_the_compiled_equations(tmp_path: Path) -> None:
     (tmp_path / "e.c").write_text(text)
     words = ["gcc", "-Wall", "-Werror", "-shared", "-fPIC", "-o", "e.so", "e.c", "-lm"]
     subprocess.run(words, cwd=tmp_path, check=True)
+    subprocess.run(["gcc", "-xc", "-c", "-"], cwd=tmp_path, check=True, input=written("wheelset", "c").encode())  # 1/0
     call = ctypes.CDLL(str(tmp_path / "e.so")).double_pendulum_equations
     found, right = (ctypes.c_double * 4)(), (ctypes.c_double * 2)()
     call(*(ctypes.c_double(numbers[name]) for name in re.findall(r"double (\w+),", text)), found, right)
