@@ -25,9 +25,9 @@ class Record:
 
     def __init__(self, *args: Any, **named: Any) -> None:
         members, fields = vars(self), self._fields
-        members.update(zip(fields, args, strict=False))
-        missing = [name for name in fields if name not in members]
-        for name in missing:
+        for name, value in zip(fields, args, strict=False):
+            members[name] = value
+        for name in list(fields)[len(args) :] if len(args) < len(fields) else ():
             field = fields[name]
             if name in named:
                 members[name] = named.pop(name)
