@@ -274,7 +274,7 @@ class PoseJoint(Joint):
     """
 
     def __init_subclass__(cls) -> None:
-        if "coordinates" not in vars(cls):
+        if "coordinates" not in vars(cls) and (not cls.coordinates or {"fixed_axes", "turns"} & vars(cls).keys()):
             lengths = [Coordinate(f"_{axis}", "length") for axis in "xyz" if axis not in cls.fixed_axes]
             every = (*lengths, *(ANGLES[AXES[axis]] for axis in cls.turns))
             cls.coordinates = every if len(every) != 1 else (Coordinate("", every[0].kind),)

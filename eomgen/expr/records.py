@@ -8,13 +8,27 @@ equality and hashes are the same.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from typing import Any, ClassVar, dataclass_transform
+
+
+class _Signature:
+    """The fields of a class as arguments, listed when they are looked at."""
+
+    def __get__(self, record: object, kind: type[Record]) -> inspect.Signature:
+        way, listed = inspect.Parameter.POSITIONAL_OR_KEYWORD, list[inspect.Parameter]()
+        for field in kind._fields.values():
+            default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+            default = default if field.default_factory is dataclasses.MISSING else None
+            listed.append(inspect.Parameter(field.name, way, default=default, annotation=field.type))
+        return inspect.Signature(listed)
 
 
 @dataclass_transform(frozen_default=True)
 class Record:
     """A class whose subclasses are frozen dataclasses, each with its own fields beside those of its bases."""
 
+    __signature__ = _Signature()
     _fields: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __init_subclass__(cls) -> None:

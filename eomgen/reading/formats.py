@@ -102,10 +102,16 @@ class _Code:
                 f"format {form!r} cannot hold the tables or functions of this model: {', '.join(sorted(unknown))}; "
                 "latex and text show them by name, and eomgen generate writes code for them"
             )
+        infinite = form not in ("sympy", "mathematica") and any(x.has(sympy.zoo) for x in whole)
+        if infinite and form not in ("c", "julia"):
+            raise UnavailableError(
+                f"format {form!r} writes pieces as masked sums, in which the infinite values of this model become NaN; "
+                "formats c, julia, sympy and mathematica hold them"
+            )
         symbols = set().union(*(x.free_symbols for x in whole), {symbol for symbol, _ in named})
         self.renamed = _renamed((str(s) for s in symbols), language.reserved | {"state_rates", "stateRates"}, form)
         put = {s: sympy.Symbol(self.renamed[str(s)]) for s in symbols}
-        changed = {**put, sympy.zoo: sympy.oo}  # 1/0 is infinite
+        changed = {**put, sympy.zoo: sympy.oo} if infinite else put  # 1/0
         self.named = [(put[symbol], x.xreplace(changed)) for symbol, x in named]
         self.mass, self.force = equations.mass_matrix.xreplace(changed), equations.force.xreplace(changed)
         self.states = [x.xreplace(changed) for x in rates[1]]

@@ -23,7 +23,7 @@ from eomgen.elements.forces.force import View
 from eomgen.elements.forces.paths import LINE, PathForce
 from eomgen.elements.frames import Marker
 from eomgen.elements.glyphs import COIL, CROSS, SPIRAL, Drawn, Glyph, JointLook, SymbolPart
-from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint, joint
+from eomgen.elements.joints import JOINTS, Closure, Coordinate, Joint, Screw, joint
 from eomgen.elements.kinds import MarkerReference, Scalar
 from eomgen.expr import vectors as vec
 from eomgen.expr.core import Expr, Graph
@@ -217,6 +217,7 @@ def test_its_keys_are_judged_by_their_kinds(keys: dict[str, Any], code: str, pat
 def test_a_joint_moves_as_it_says() -> None:
     mod = slanting().compile(target="numpy")
     np.testing.assert_allclose(mod.rhs(0.0, [0.0, 0.0])[1], -5.0, rtol=1e-14)  # g / (1 + slope^2)
+    assert type("Finer", (Screw,), {}).coordinates == Screw.coordinates
 
 
 def test_a_constraint_holds_what_it_says() -> None:

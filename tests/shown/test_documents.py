@@ -340,9 +340,7 @@ def test_a_stored_notebook_is_a_lesson_that_can_be_handed_out(path: Path) -> Non
 
 def test_the_commits_that_show_how_to_add_something_are_there() -> None:
     """A full clone has them; each adds to the package, to a test and, but for functions of modules, to a page."""
-    recipes = re.findall(
-        r"^\| (Recipe: [^|]+) \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
+    recipes = re.findall(r"^\| (Recipe: [^|]+) \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.M)
     assert len(recipes) == 8
     git = ["git", "-C", str(ROOT)]
     known = subprocess.run([*git, "rev-parse", "--is-shallow-repository"], capture_output=True, text=True, check=False)
